@@ -1,0 +1,1 @@
+//! Rigs, windows and devices of an installation.

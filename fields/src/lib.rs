@@ -1,0 +1,1 @@
+//! Field containers, routes and their evaluation.

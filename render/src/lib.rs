@@ -1,0 +1,1 @@
+//! Draws every view of a scene with shadow maps and stencil shadow volumes.

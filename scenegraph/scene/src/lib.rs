@@ -1,0 +1,23 @@
+//! Plain data that a renderer draws: meshes, materials, lights, stencil groups, views.
+//!
+//! The one idea: a frame is a value. [`Scene`] says what there is, [`Picture`] says from where it is seen and how
+//! the views are laid out; a renderer, a ray tracer or a test needs nothing else. Bulk data sits behind `Arc`, so a
+//! scene is cheap to keep up to date and a cache may recognise a mesh by its pointer.
+//!
+//! This crate knows nothing of fields, nodes, files, scripts, GPUs or windows.
+//!
+//! Conventions: right-handed, y up, metres, radians, linear colour. Matrices are named `foo_from_bar`.
+
+mod bounds;
+mod light;
+mod material;
+mod mesh;
+mod scene;
+mod view;
+
+pub use bounds::Aabb;
+pub use light::{Light, LightKind, MapFilter, MapSettings, ShadowMethod};
+pub use material::{AlphaMode, Filter, Image, Material, Sampler, Shading, TextureRef, Wrap};
+pub use mesh::{Mesh, MeshError, MorphTarget, Topology};
+pub use scene::{Background, Drawable, Film, Fog, FogKind, Pose, Scene, StencilGroup, StencilMode};
+pub use view::{Frustum, Layout, Picture, PictureKind, Rect, View};

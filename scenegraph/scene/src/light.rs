@@ -1,0 +1,124 @@
+//! Light sources and how each casts its shadows.
+
+use glam::Vec3;
+
+/// A light source in world space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Light {
+    /// Name of the node it came from, for messages.
+    pub name: String,
+    /// Kind and the cone, where it has one.
+    pub kind: LightKind,
+    /// Position in the world, metres. Of a directional light: the place its projection is centred on when set by hand.
+    pub position: Vec3,
+    /// Unit vector along which the light travels (from the light into the scene).
+    pub direction: Vec3,
+    /// Linear RGB colour.
+    pub color: Vec3,
+    /// Lux for directional lights, candela for the others (as KHR_lights_punctual). A white surface that a directional
+    /// light of intensity pi meets at right angles reflects exactly 1.
+    pub intensity: f32,
+    /// Share of `color` that reaches every surface in reach, shadowed or not (X3D `ambientIntensity`).
+    pub ambient_intensity: f32,
+    /// Constant, linear and quadratic attenuation. (0, 0, 1) is the inverse square law.
+    pub attenuation: Vec3,
+    /// Beyond this distance the light has no effect, metres; infinite where unlimited. Unused by directional lights.
+    pub range: f32,
+    /// How it casts shadows.
+    pub shadows: ShadowMethod,
+    /// Share of the light that a shadow takes away, 0..=1.
+    pub shadow_intensity: f32,
+    /// Settings of the shadow map, read when `shadows` is [`ShadowMethod::Map`].
+    pub map: MapSettings,
+}
+
+/// Kind of a light source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// Parallel light, such as the sun.
+    Directional,
+    /// A cone of light. Full strength inside `inner_rad`, none outside `outer_rad`; both are half angles.
+    Spot {
+        /// Half angle of the cone of full strength, radians.
+        inner_rad: f32,
+        /// Half angle of the whole cone, radians, below pi.
+        outer_rad: f32,
+    },
+    /// Light into all directions.
+    Point,
+}
+
+/// How a light casts shadows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ShadowMethod {
+    /// Shines through everything.
+    #[default]
+    None,
+    /// Shadow map.
+    Map,
+    /// Stencil shadow volumes.
+    Volume,
+}
+
+/// Filter of a shadow map look-up (003 section 4.2, `fpLightSource` of 000).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum MapFilter {
+    /// One comparison, nearest texel.
+    None,
+    /// Hardware 2x2 comparison, bilinear.
+    Hardware,
+    /// 4 bilinear comparisons.
+    Pcf4,
+    /// 16 bilinear comparisons.
+    #[default]
+    Pcf16,
+}
+
+/// Settings of a shadow map. `None` means fitted to the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapSettings {
+    /// Side of the square map, texels. The renderer reports a size it cannot make and uses the nearest it can.
+    pub size: u32,
+    /// Left, right, bottom, top of the light's frustum at distance 1 (spot) or in metres (directional), by hand.
+    pub frustum: Option<[f32; 4]>,
+    /// Near and far distance of the light's frustum, metres, by hand.
+    pub near_far: Option<[f32; 2]>,
+    /// Manual bias that grows with the depth slope, texels (000 displace scale); `None` tunes itself.
+    pub slope_bias: Option<f32>,
+    /// Manual constant bias, metres (000 displace offset); `None` tunes itself.
+    pub constant_bias: Option<f32>,
+    /// Filter of look-ups.
+    pub filter: MapFilter,
+}
+
+impl Default for MapSettings {
+    fn default() -> MapSettings {
+        MapSettings {
+            size: 2048,
+            frustum: None,
+            near_far: None,
+            slope_bias: None,
+            constant_bias: None,
+            filter: MapFilter::default(),
+        }
+    }
+}
+
+impl Default for Light {
+    fn default() -> Light {
+        Light {
+            name: String::new(),
+            kind: LightKind::Directional,
+            position: Vec3::ZERO,
+            direction: Vec3::NEG_Z,
+            color: Vec3::ONE,
+            intensity: std::f32::consts::PI,
+            ambient_intensity: 0.0,
+            attenuation: Vec3::Z,
+            range: f32::INFINITY,
+            shadows: ShadowMethod::None,
+            shadow_intensity: 1.0,
+            map: MapSettings::default(),
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! What there is to draw.
+
+use crate::{Aabb, Light, Material, Mesh};
+use glam::{Mat4, Vec3, Vec4};
+use std::sync::Arc;
+
+/// Everything that is drawn in a frame, in world space. Kept from frame to frame and updated in place.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Shapes. A place may be vacant ([`Drawable::visible`] false); places keep their shape as long as it lives.
+    pub drawables: Vec<Drawable>,
+    /// Light sources that are switched on.
+    pub lights: Vec<Light>,
+    /// Groups of casters made by `StencilShadow` nodes.
+    pub stencil_groups: Vec<StencilGroup>,
+    /// Light that reaches every surface from everywhere, linear RGB.
+    pub ambient: Vec3,
+    /// What is behind everything.
+    pub background: Background,
+    /// Haze, where there is any.
+    pub fog: Option<Fog>,
+    /// Factor of the linear picture before it is encoded; 1 leaves it.
+    pub exposure: f32,
+}
+
+/// One shape at one place.
+#[derive(Clone, Debug)]
+pub struct Drawable {
+    /// Name of its node, for messages and statistics.
+    pub name: String,
+    /// Its triangles; equal `Arc`s are drawn as instances.
+    pub mesh: Arc<Mesh>,
+    /// How it looks.
+    pub material: Arc<Material>,
+    /// Where it is. A mirroring matrix is fine.
+    pub world_from_object: Mat4,
+    /// Skin and morph weights, where the mesh has any.
+    pub pose: Option<Arc<Pose>>,
+    /// Box around it in the world, deformation included.
+    pub bounds_in_world: Aabb,
+    /// Drawn at all.
+    pub visible: bool,
+    /// Throws shadows.
+    pub casts_shadow: bool,
+    /// Shadows fall on it.
+    pub receives_shadow: bool,
+    /// Grows with every change of this entry.
+    pub revision: u64,
+}
+
+/// Deformation of one drawable.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// `object_from_bind` matrix of each joint: the joint's present pose times its inverse bind matrix, in the space of
+    /// the drawable's object. Empty where the mesh has no skin.
+    pub object_from_bind: Vec<Mat4>,
+    /// One weight per morph target of the mesh.
+    pub morph_weights: Vec<f32>,
+}
+
+/// Casters that a `StencilShadow` node gathers (000 section 4.2).
+#[derive(Clone, Debug, PartialEq)]
+pub struct StencilGroup {
+    /// Name of the node, for messages.
+    pub name: String,
+    /// Its light: a place in [`Scene::lights`].
+    pub light: usize,
+    /// Its casters: places in [`Scene::drawables`].
+    pub casters: Vec<usize>,
+    /// How its shadow is brought into the picture.
+    pub mode: StencilMode,
+}
+
+/// How a stencil shadow is brought into the picture (000 section 3.2).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StencilMode {
+    /// Additive light masking: the group's light is added outside its shadow only.
+    Additive,
+    /// The picture is tinted by a film where the group's shadow falls; the light itself shines everywhere.
+    Modulative(Film),
+}
+
+/// The half-transparent film of the paper's `ShadowQuad`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Film {
+    /// Linear RGB and opacity.
+    pub color: Vec4,
+}
+
+impl Default for Film {
+    /// Black at alpha 0.5, as in 000.
+    fn default() -> Film {
+        Film { color: Vec4::new(0.0, 0.0, 0.0, 0.5) }
+    }
+}
+
+/// What is behind everything: a vertical gradient, linear RGB.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Background {
+    /// Straight up.
+    pub zenith: Vec3,
+    /// At the horizon, from above.
+    pub horizon: Vec3,
+    /// Straight down.
+    pub nadir: Vec3,
+}
+
+/// Haze that hides what is far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fog {
+    /// Linear RGB.
+    pub color: Vec3,
+    /// How it thickens.
+    pub kind: FogKind,
+    /// Distance at which nothing but fog is seen, metres (X3D `visibilityRange`).
+    pub visibility_range: f32,
+}
+
+/// How fog thickens with distance (X3D Fog).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FogKind {
+    /// Linearly.
+    #[default]
+    Linear,
+    /// As `exp(-d / (range - d))`.
+    Exponential,
+}

@@ -1,0 +1,1 @@
+//! Node types, importers and extraction into a flat scene.

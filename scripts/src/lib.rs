@@ -1,0 +1,1 @@
+//! Worlds written in rhai.

@@ -1,0 +1,2 @@
+//! The `umbriel` command.
+fn main() {}
