@@ -1,1 +1,11 @@
 //! Node types, importers and extraction into a flat scene.
+//!
+//! The one idea: there is no second structure. A scene is field containers whose `children` fields name each other; the
+//! [`Extractor`] compiles them once into flat lists and then follows revisions, so that a frame costs what changed and
+//! not what there is.
+//!
+//! What it does not know: GPUs and how anything is drawn, scripts, sockets, windows, devices. Its result is a plain
+//! [`umbriel_scene::Scene`].
+
+#[allow(dead_code)]
+pub mod geometry;
