@@ -1,0 +1,14 @@
+//! Rigs: users, screens and displays in a room, turned into views.
+
+mod arrange;
+mod camera;
+mod channels;
+mod eyes;
+mod off_axis;
+
+pub use crate::error::RigError;
+pub use arrange::Arrangement;
+pub use camera::{Camera, fit_camera};
+pub use channels::{Room, cylinder_screens, room_screens};
+pub use eyes::{Eye, Head};
+pub use off_axis::{ScreenCorners, off_axis};
