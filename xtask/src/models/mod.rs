@@ -16,12 +16,13 @@ use std::path::Path;
 
 type Build = fn() -> Glb;
 
-const MODELS: [(&str, Build); 10] = [
+const MODELS: [(&str, Build); 11] = [
     ("house", town::house),
     ("stall", town::stall),
     ("church", town::church),
     ("fountain", town::fountain),
     ("lamp", town::lamp),
+    ("square", town::square),
     ("tree", trees::tree),
     ("figure", figure::figure),
     ("ferry", harbour::ferry),

@@ -104,3 +104,15 @@ pub(crate) fn leaves() -> RgbaImage {
     }
     picture
 }
+
+/// Cobbles in offset rows, rounded at their rims.
+pub(crate) fn cobbles() -> RgbaImage {
+    RgbaImage::from_fn(128, 128, |x, y| {
+        let row = y / 16;
+        let shifted = (x + if row % 2 == 0 { 0 } else { 8 }) % 128;
+        let (u, v) = ((shifted % 16) as f32 - 7.5, (y % 16) as f32 - 7.5);
+        let rim = ((u / 7.6).powi(4) + (v / 7.6).powi(4)).min(1.0);
+        let tone = 0.8 + 0.25 * grain(shifted / 16, row) + 0.08 * grain(x, y);
+        shade([150, 142, 130], tone * (1.0 - 0.45 * rim))
+    })
+}

@@ -192,3 +192,20 @@ pub(crate) fn lamp() -> Glb {
     glb.node("flame", Some(root), Vec3::Y * 3.3, None);
     glb
 }
+
+/// The paved square, 80 metres wide, with a field around it.
+pub(crate) fn square() -> Glb {
+    let mut glb = Glb::default();
+    let cobbles = textured(&mut glb, "cobbles", &paint::cobbles(), false);
+    let grass = glb.plain("grass", [0.11, 0.17, 0.05], 1.0);
+    let [mut paving, mut field] = std::array::from_fn(|_| Surface::default());
+    let flat = |s: &mut Surface, half: f32, y: f32, repeats: f32| {
+        let at = |x: f32, z: f32| vec3(x * half, y, z * half);
+        s.quad([at(-1.0, 1.0), at(1.0, 1.0), at(1.0, -1.0), at(-1.0, -1.0)], Vec2::splat(repeats));
+    };
+    flat(&mut paving, 40.0, 0.0, 40.0);
+    flat(&mut field, 400.0, -0.05, 1.0);
+    let mesh = glb.mesh("square", &[(cobbles, &paving), (grass, &field)]);
+    glb.node("square", None, Vec3::ZERO, Some(mesh));
+    glb
+}

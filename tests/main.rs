@@ -1,0 +1,4 @@
+//! Tests of the whole: what the command does, and who may depend on whom. One binary, one module per subject.
+
+mod layers;
+mod support;
