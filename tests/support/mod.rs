@@ -18,3 +18,23 @@ pub(crate) fn samples() -> Option<PathBuf> {
     println!("not run: the samples are absent ({})", folder.display());
     None
 }
+
+/// What a run of the command gave.
+pub(crate) struct Run {
+    /// Its exit status was 0.
+    pub(crate) ok: bool,
+    /// What it printed.
+    pub(crate) stdout: String,
+    /// What it reported.
+    pub(crate) stderr: String,
+}
+
+/// Runs the `umbriel` command to its end.
+pub(crate) fn umbriel(args: &[&str]) -> Run {
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_umbriel")).args(args).output().expect("the command can be started");
+    Run {
+        ok: output.status.success(),
+        stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+        stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+    }
+}

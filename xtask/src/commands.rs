@@ -25,11 +25,8 @@ pub(crate) fn demo() -> Result<(), String> {
 
 /// Draws the small pictures beside the worlds again.
 pub(crate) fn goldens() -> Result<(), String> {
-    build()?;
-    for world in worlds()? {
-        umbriel(&["run", &text(&world), "--headless", "--fit", "256x256", "--out", &text(&world.with_extension("png"))])?;
-    }
-    Ok(())
+    let args = ["test", "--package", "umbriel", "--test", "umbriel", "worlds::every_world"];
+    run(cargo_command(&args).env("UMBRIEL_BLESS", "1"), "UMBRIEL_BLESS=1 cargo test worlds")
 }
 
 /// Formatting, lints, documentation and all tests.
@@ -54,8 +51,13 @@ fn build() -> Result<(), String> {
 }
 
 fn cargo(args: &[&str]) -> Result<(), String> {
-    let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    run(Command::new(program).args(args).env("RUSTDOCFLAGS", "--deny warnings"), &format!("cargo {}", args.join(" ")))
+    run(&mut cargo_command(args), &format!("cargo {}", args.join(" ")))
+}
+
+fn cargo_command(args: &[&str]) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.args(args).env("RUSTDOCFLAGS", "--deny warnings");
+    command
 }
 
 fn umbriel(args: &[&str]) -> Result<(), String> {
