@@ -8,16 +8,26 @@
 //!
 //! Conventions: right-handed, y up, metres, radians, linear colour. Matrices are named `foo_from_bar`.
 
+mod adjacency;
 mod bounds;
+mod deform;
 mod light;
 mod material;
 mod mesh;
 mod scene;
+mod score;
+mod tangents;
+mod trace;
 mod view;
 
+pub use adjacency::{Edge, Edges};
 pub use bounds::Aabb;
+pub use deform::{Deformed, deformed};
 pub use light::{Light, LightKind, MapFilter, MapSettings, ShadowMethod};
 pub use material::{AlphaMode, Filter, Image, Material, Sampler, Shading, TextureRef, Wrap};
 pub use mesh::{Mesh, MeshError, MorphTarget, Topology};
 pub use scene::{Background, Drawable, Film, Fog, FogKind, Pose, Scene, StencilGroup, StencilMode};
+pub use score::{Score, difference, score};
+pub use tangents::tangents;
+pub use trace::{Mask, MaskError, TraceError, TraceOptions, Tracer, trace_visibility};
 pub use view::{Frustum, Layout, Picture, PictureKind, Rect, View};

@@ -1,0 +1,180 @@
+//! Exact hard shadows by ray tracing: the truth that maps, volumes and soft shadows are scored against.
+//!
+//! It answers one question, "what does this light do at what this pixel sees?", in double precision and without any
+//! bias but the offset of shadow rays. It does not shade.
+
+mod alpha;
+mod beam;
+mod camera;
+mod mask;
+mod ray;
+mod triangles;
+
+pub use mask::{Mask, MaskError};
+
+use crate::{Light, Scene, View};
+use beam::Beam;
+use camera::Camera;
+use glam::DVec3;
+use ray::{Hit, Ray};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
+use triangles::Soup;
+
+/// How a mask is traced. The default is what the masks of reference were made with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TraceOptions {
+    /// Rays per pixel along each axis; where they disagree the pixel is [`Mask::MIXED`]. At least 1.
+    pub sub_samples: u32,
+    /// Surfaces whose cosine towards the light is at most this are [`Mask::AWAY`].
+    pub graze: f64,
+    /// Distance of a shadow ray's start from its surface, as a share of the diagonal of the scene's bounds.
+    pub eps_scale: f64,
+    /// Single-sided faces are not there when seen from behind. They cast shadows from both sides all the same.
+    pub cull: bool,
+    /// Surfaces with alpha mode blend, which the eye does not see here, cast shadows.
+    pub blend_casts: bool,
+}
+
+impl Default for TraceOptions {
+    fn default() -> TraceOptions {
+        TraceOptions { sub_samples: 4, graze: 0.03, eps_scale: 1e-5, cull: true, blend_casts: true }
+    }
+}
+
+/// Why a mask cannot be traced.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TraceError {
+    /// The scene has no such light.
+    #[error("the scene has {count} lights, there is no light {light}")]
+    NoLight {
+        /// The place asked for.
+        light: usize,
+        /// Number of lights.
+        count: usize,
+    },
+    /// The light's direction or position is NaN, infinite, or a direction of length zero.
+    #[error("light '{light}': direction {direction}, position {position} give no rays")]
+    BadLight {
+        /// Name of the light.
+        light: String,
+        /// Its direction.
+        direction: glam::Vec3,
+        /// Its position.
+        position: glam::Vec3,
+    },
+    /// The view's matrix cannot be inverted, or its window has no size.
+    #[error("view '{view}': its matrix or its window gives no rays")]
+    BadView {
+        /// Name of the view.
+        view: String,
+    },
+}
+
+/// Traces what light number `light` of `scene` does in each pixel of `view`.
+pub fn trace_visibility(scene: &Scene, light: usize, view: &View, options: &TraceOptions) -> Result<Mask, TraceError> {
+    let chosen = scene.lights.get(light).ok_or(TraceError::NoLight { light, count: scene.lights.len() })?;
+    Tracer::new(scene).visibility(chosen, view, options, &|_| ())
+}
+
+/// The triangles of a scene, deformed and in the world, in a bounding volume hierarchy.
+pub struct Tracer {
+    soup: Soup,
+}
+
+impl Tracer {
+    /// Takes all visible triangles of the scene. Those that are not finite, that have no area, or whose indices are out of
+    /// range are left out.
+    pub fn new(scene: &Scene) -> Tracer {
+        Tracer { soup: Soup::new(scene) }
+    }
+
+    /// Number of triangles that rays can meet.
+    pub fn triangle_count(&self) -> usize {
+        self.soup.triangles.len()
+    }
+
+    /// Traces what `light` does in each pixel of `view`, on all cores. Rays start at the eye, in front of the near plane
+    /// too. Range and attenuation of the light do not count; a shape that receives no shadows is lit where it faces the
+    /// light. `progress` hears the number of rows that are done, from any thread.
+    pub fn visibility(
+        &self,
+        light: &Light,
+        view: &View,
+        options: &TraceOptions,
+        progress: &(dyn Fn(u32) + Sync),
+    ) -> Result<Mask, TraceError> {
+        let beam = Beam::new(light)?;
+        let camera = Camera::new(view, options.sub_samples.max(1))?;
+        let [width, height] = view.size;
+        let mut mask = Mask::background(width, height);
+        let done = AtomicU32::new(0);
+        let rows = Mutex::new((0u32..).zip(mask.classes.chunks_mut((width as usize).max(1))));
+        let work = || {
+            loop {
+                // The guard must not live while the row is traced.
+                let next = rows.lock().unwrap_or_else(|e| e.into_inner()).next();
+                let Some((y, row)) = next else { break };
+                for (x, class) in (0..).zip(row) {
+                    *class = self.pixel(&camera, [x, y], &beam, options);
+                }
+                progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 1..std::thread::available_parallelism().map_or(1, |n| n.get()) {
+                scope.spawn(work);
+            }
+            work();
+        });
+        Ok(mask)
+    }
+
+    /// The class of a pixel: that of all its rays, or mixed.
+    fn pixel(&self, camera: &Camera, pixel: [u32; 2], beam: &Beam, options: &TraceOptions) -> u8 {
+        let mut classes = camera.directions(pixel).map(|direction| self.classify(camera.eye, direction, beam, options));
+        let first = classes.next().unwrap_or(Mask::BACKGROUND);
+        if classes.all(|class| class == first) { first } else { Mask::MIXED }
+    }
+
+    /// The class of what a ray from `eye` along the unit vector `direction` meets.
+    fn classify(&self, eye: DVec3, direction: DVec3, beam: &Beam, options: &TraceOptions) -> u8 {
+        let Some(hit) = self.first_seen(&Ray::new(eye, direction), options.cull) else { return Mask::BACKGROUND };
+        let triangle = &self.soup.triangles[hit.triangle];
+        let normal = triangle.normal();
+        // Once more against the plane: the hit's own distance comes from barycentrics.
+        let distance = (triangle.corners[0] - eye).dot(normal) / normal.dot(direction);
+        let point = eye + direction * distance;
+        let facing = if normal.dot(direction) > 0.0 { -normal } else { normal };
+        let (to_light, far) = beam.to_light(point, facing);
+        if beam.is_outside_of_cone(to_light) {
+            return Mask::OUTSIDE;
+        }
+        if facing.dot(to_light) <= options.graze {
+            return Mask::AWAY;
+        }
+        let eps = self.soup.diagonal() * options.eps_scale;
+        let shadow = Ray::new(point + facing * eps, to_light);
+        let receives = self.soup.shapes[triangle.shape as usize].receives;
+        if receives && self.is_blocked(&shadow, far - 2.0 * eps, options.blend_casts) { Mask::SHADOW } else { Mask::LIT }
+    }
+
+    /// The first triangle along the ray that the eye sees.
+    fn first_seen(&self, ray: &Ray, cull: bool) -> Option<Hit> {
+        self.soup.first(ray, |hit| {
+            let shape = &self.soup.shapes[self.soup.triangles[hit.triangle].shape as usize];
+            !shape.blend && (hit.front || shape.double_sided || !cull) && self.soup.is_there(hit)
+        })
+    }
+
+    /// Is there a caster on the ray before the distance `far`?
+    fn is_blocked(&self, ray: &Ray, far: f64, blend_casts: bool) -> bool {
+        self.soup.any(ray, far, |hit| {
+            let shape = &self.soup.shapes[self.soup.triangles[hit.triangle].shape as usize];
+            shape.casts && (blend_casts || !shape.blend) && self.soup.is_there(hit)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

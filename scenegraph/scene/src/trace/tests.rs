@@ -1,0 +1,323 @@
+mod shapes;
+
+use super::*;
+use crate::{AlphaMode, Drawable, Filter, Frustum, Image, Material, Mesh, Pose, Sampler, TextureRef};
+use glam::{Affine2, Mat4, Vec3, Vec4, dvec3, vec3};
+use shapes::*;
+use std::sync::Arc;
+
+fn scene(drawables: Vec<Drawable>) -> Scene {
+    Scene { drawables, ..Scene::default() }
+}
+
+/// What the light does at the point where a ray from `eye` towards `target` ends.
+fn class(scene: &Scene, light: &Light, eye: Vec3, target: Vec3, options: &TraceOptions) -> u8 {
+    let direction = (target - eye).as_dvec3().normalize();
+    Tracer::new(scene).classify(eye.as_dvec3(), direction, &Beam::new(light).unwrap(), options)
+}
+
+fn check(name: &str, scene: &Scene, light: &Light, rows: &[(Vec3, Vec3, u8)]) {
+    for &(eye, target, expected) in rows {
+        assert_eq!(class(scene, light, eye, target, &TraceOptions::default()), expected, "{name}: from {eye} to {target}");
+    }
+}
+
+fn view(eye: Vec3, target: Vec3, size: [u32; 2]) -> View {
+    let view_from_world = glam::camera::rh::view::look_at_mat4(eye, target, Vec3::Y);
+    let frustum = Frustum::symmetric(1.0, size[0] as f32 / size[1] as f32, 0.1);
+    View { name: "test".into(), view_from_world, frustum, size }
+}
+
+const BACKGROUND: u8 = Mask::BACKGROUND;
+const LIT: u8 = Mask::LIT;
+const SHADOW: u8 = Mask::SHADOW;
+const AWAY: u8 = Mask::AWAY;
+const OUTSIDE: u8 = Mask::OUTSIDE;
+
+#[test]
+fn box_in_the_sun() {
+    // From x = 1 its shadow is as long as the box is high: 2.
+    let world = scene(vec![ground(10.0), box_at(vec3(0.0, 1.0, 0.0))]);
+    let eye = vec3(3.0, 12.0, 0.5);
+    check(
+        "sun",
+        &world,
+        &sun(vec3(1.0, -1.0, 0.0)),
+        &[
+            (eye, vec3(2.999, 0.0, 0.0), SHADOW),
+            (eye, vec3(3.001, 0.0, 0.0), LIT),
+            (eye, vec3(1.001, 0.0, 0.999), SHADOW),
+            (eye, vec3(1.5, 0.0, 1.001), LIT),
+            (eye, vec3(0.0, 2.0, 0.0), LIT),
+            (eye, vec3(1.0, 1.0, 0.0), AWAY),
+            (eye, vec3(-9.9, 0.0, 0.0), LIT),
+            (eye, vec3(10.1, 0.0, 0.0), BACKGROUND),
+            (eye, vec3(3.0, 13.0, 0.0), BACKGROUND),
+            (vec3(-5.0, 1.0, 0.0), vec3(-1.0, 1.0, 0.0), LIT),
+            // The ground has one side.
+            (vec3(5.0, -2.0, 0.0), vec3(5.0, 0.0, 0.0), BACKGROUND),
+        ],
+    );
+    let grazing = |slope: f32| class(&world, &sun(vec3(1.0, -slope, 0.0)), eye, vec3(-5.0, 0.0, 0.0), &TraceOptions::default());
+    assert_eq!((grazing(0.0299), grazing(0.0302)), (AWAY, LIT));
+}
+
+#[test]
+fn spots_have_cones() {
+    let world = scene(vec![ground(10.0), box_at(vec3(0.0, 1.0, 0.0))]);
+    let rim = 4.0 * 0.5_f32.tan();
+    let rows = [
+        (vec3(0.0, 9.0, 5.0), vec3(rim - 0.001, 0.0, 0.0), LIT),
+        (vec3(0.0, 9.0, 5.0), vec3(rim + 0.001, 0.0, 0.0), OUTSIDE),
+        // Under the light, on the far side of the box: not in the cone comes before facing away.
+        (vec3(8.0, 1.0, 0.0), vec3(1.0, 0.1, 0.0), AWAY),
+        (vec3(0.0, 9.0, 5.0), vec3(0.5, 2.0, 0.5), LIT),
+    ];
+    check("spot", &world, &spot(vec3(0.0, 4.0, 0.0), 0.5), &rows);
+    check("outside first", &world, &spot(vec3(0.0, 4.0, 0.0), 0.1), &[(vec3(8.0, 1.0, 0.0), vec3(1.0, 0.1, 0.0), OUTSIDE)]);
+}
+
+#[test]
+fn shadow_of_a_sphere_is_the_cone_through_its_circle() {
+    let (light, centre) = (vec3(0.3, 4.0, 0.2), vec3(0.0, 1.5, 0.0));
+    let world =
+        Scene { lights: vec![lamp(light)], ..scene(vec![ground(6.0), drawable(sphere(160), Mat4::from_translation(centre))]) };
+    let view = view(vec3(5.0, 6.0, 5.0), vec3(0.0, 0.0, 0.0), [240, 180]);
+    let camera = Camera::new(&view, 1).unwrap();
+    let mask = trace_visibility(&world, 0, &view, &TraceOptions { sub_samples: 1, ..TraceOptions::default() }).unwrap();
+    // Distance of the sphere's centre from a ray, and whether it is in front of the end.
+    let distance = |from: DVec3, along: DVec3| (centre.as_dvec3() - from).cross(along).length();
+    let (mut compared, mut shadowed) = (0, 0);
+    for (pixel, class) in (0..240 * 180).zip(&mask.classes) {
+        let direction = camera.directions([pixel % 240, pixel / 240]).next().unwrap();
+        let at_ground = camera.eye - direction * (camera.eye.y / direction.y);
+        let to_light = (light.as_dvec3() - at_ground).normalize();
+        let (seen_past, lit_past) = (distance(camera.eye, direction), distance(at_ground, to_light));
+        let on_ground = direction.y < 0.0 && at_ground.x.abs() < 6.0 && at_ground.z.abs() < 6.0;
+        if !on_ground || seen_past < 1.0 || (lit_past - 1.0).abs() < 4e-4 {
+            continue;
+        }
+        let expected = if lit_past < 1.0 { SHADOW } else { LIT };
+        assert_eq!(*class, expected, "pixel {pixel}, {at_ground}");
+        compared += 1;
+        shadowed += usize::from(lit_past < 1.0);
+    }
+    assert!(compared > 15_000 && shadowed > 800, "{compared} compared, {shadowed} in shadow");
+    // Straight above, the shadow is a circle of radius h tan(asin(r / (h - c))).
+    let radius = 4.0 * (1.0_f32 / 2.5).asin().tan();
+    let world = scene(vec![ground(6.0), drawable(sphere(160), Mat4::from_translation(centre))]);
+    for angle in 0..32 {
+        let out = vec3((angle as f32 * 0.2).cos(), 0.0, (angle as f32 * 0.2).sin());
+        let eye = out * 8.0 + Vec3::Y;
+        check("circle", &world, &lamp(Vec3::Y * 4.0), &[(eye, out * radius * 0.999, SHADOW), (eye, out * radius * 1.001, LIT)]);
+    }
+}
+
+/// A way in which a shape differs from the plain one.
+type Change = fn(&mut Drawable, &mut Material);
+
+#[test]
+fn sheets_sides_and_alpha_modes() {
+    let sheet = |change: Change| {
+        let above = drawable(square(), Mat4::from_translation(Vec3::Y * 2.0));
+        scene(vec![ground(10.0), with(above, change)])
+    };
+    let (above, below) = (vec3(0.0, 5.0, 0.0), vec3(0.0, 2.0, 0.0));
+    let under = vec3(4.0, 1.0, 0.0);
+    let (from_below, upwards) = (vec3(0.1, 1.0, 0.0), vec3(0.1, 2.0, 0.0));
+    let plain = TraceOptions::default();
+    let no_cull = TraceOptions { cull: false, ..plain.clone() };
+    let no_blend = TraceOptions { blend_casts: false, ..plain.clone() };
+    let blend: Change = |_, m| m.alpha = AlphaMode::Blend;
+    let upside_down: Change = |d, _| d.world_from_object *= Mat4::from_rotation_x(3.0);
+    // What differs, options, eye, target, class under a sun from above.
+    let rows: Vec<(&str, Change, &TraceOptions, Vec3, Vec3, u8)> = vec![
+        ("sheet from above", |_, _| (), &plain, above, below, LIT),
+        ("its shadow", |_, _| (), &plain, under, Vec3::ZERO, SHADOW),
+        ("beside it", |_, _| (), &plain, under, vec3(1.01, 0.0, 0.0), LIT),
+        ("sheet from below", |_, _| (), &plain, from_below, upwards, BACKGROUND),
+        ("without culling", |_, _| (), &no_cull, from_below, upwards, AWAY),
+        ("of two sides", |_, m| m.double_sided = true, &plain, from_below, upwards, AWAY),
+        ("back to the sun", upside_down, &plain, under, Vec3::ZERO, SHADOW),
+        ("back to the eye", upside_down, &plain, above, vec3(0.3, 2.0, 0.0), SHADOW),
+        ("mirrored", |d, _| d.world_from_object *= Mat4::from_scale(vec3(-1.0, 1.0, 1.0)), &plain, above, below, LIT),
+        (
+            "turned inside out",
+            |d, _| d.world_from_object *= Mat4::from_scale(vec3(1.0, -1.0, 1.0)),
+            &plain,
+            from_below,
+            upwards,
+            AWAY,
+        ),
+        ("blend is not seen", blend, &plain, above, below, SHADOW),
+        ("blend casts", blend, &plain, under, Vec3::ZERO, SHADOW),
+        ("blend without casting", blend, &no_blend, under, Vec3::ZERO, LIT),
+        ("no caster", |d, _| d.casts_shadow = false, &plain, under, Vec3::ZERO, LIT),
+        ("no caster, but seen", |d, _| d.casts_shadow = false, &plain, above, below, LIT),
+        ("not visible", |d, _| d.visible = false, &plain, under, Vec3::ZERO, LIT),
+        (
+            "moved by its pose",
+            |d, _| {
+                let lift = Mat4::from_translation(Vec3::X * 5.0);
+                let skinned = Mesh { joints: [[0; 4]; 4].into(), weights: [Vec4::X; 4].into(), ..square() };
+                d.mesh = Arc::new(skinned);
+                d.pose = Some(Arc::new(Pose { object_from_bind: vec![lift], morph_weights: vec![] }));
+            },
+            &plain,
+            under,
+            vec3(5.9, 0.0, 0.0),
+            SHADOW,
+        ),
+    ];
+    for (name, change, options, eye, target, expected) in rows {
+        let found = class(&sheet(change), &sun(Vec3::NEG_Y), eye, target, options);
+        assert_eq!(found, expected, "{name}: from {eye} to {target}");
+    }
+    let mut deaf = sheet(|_, _| ());
+    deaf.drawables[0].receives_shadow = false;
+    assert_eq!(class(&deaf, &sun(Vec3::NEG_Y), under, Vec3::ZERO, &plain), LIT, "receives no shadows");
+}
+
+#[test]
+fn alpha_masks_have_holes_for_the_eye_and_for_light() {
+    // The left half of the sheet is there, the right half is not.
+    let rgba: Vec<u8> = [255, 0].into_iter().flat_map(|a| [0, 0, 0, a]).collect();
+    let image = Arc::new(Image { width: 2, height: 1, rgba: rgba.into() });
+    let sampler = Sampler { filter: Filter::Nearest, ..Sampler::default() };
+    let texture = TextureRef { image, sampler, uv_set: 0, uv_from_mesh: Affine2::IDENTITY };
+    let masked = |m: Mat4| {
+        with(drawable(square(), Mat4::from_translation(Vec3::Y * 2.0) * m), |_, material| {
+            material.alpha = AlphaMode::Mask { cutoff: 0.5 };
+            material.base_color_texture = Some(texture.clone());
+            material.double_sided = true;
+        })
+    };
+    let (up, under) = (vec3(0.0, 9.0, 0.0), vec3(4.0, 1.0, 0.0));
+    let (left, right) = (vec3(-0.5, 0.0, 0.2), vec3(0.5, 0.0, 0.2));
+    let light = sun(Vec3::NEG_Y);
+    check(
+        "mask",
+        &scene(vec![ground(10.0), masked(Mat4::IDENTITY)]),
+        &light,
+        &[
+            (under, left, SHADOW),
+            (under, right, LIT),
+            (up, left + Vec3::Y * 2.0, LIT),
+            (up, right + Vec3::Y * 2.0, LIT),
+            // Through the hole at the ground in the shadow of the other half.
+            (vec3(1.0, 5.0, 0.0), vec3(-0.1, 0.0, 0.0), SHADOW),
+        ],
+    );
+    check(
+        "mirrored mask",
+        &scene(vec![ground(10.0), masked(Mat4::from_scale(vec3(-1.0, 1.0, 1.0)))]),
+        &light,
+        &[(under, left, LIT), (under, right, SHADOW)],
+    );
+    let thin = |alpha: f32| {
+        let pane = with(masked(Mat4::IDENTITY), |_, m| {
+            m.base_color_texture = None;
+            m.base_color.w = alpha;
+        });
+        class(&scene(vec![ground(10.0), pane]), &light, under, left, &TraceOptions::default())
+    };
+    assert_eq!((thin(0.5), thin(0.49)), (SHADOW, LIT));
+}
+
+#[test]
+fn light_and_eye_inside_of_a_caster() {
+    let eye = vec3(0.2, 6.0, 6.0);
+    let room = box_at(vec3(0.0, 1.0, 0.0));
+    let closed = scene(vec![ground(10.0), room.clone()]);
+    for x in [-0.9, 0.0, 0.7] {
+        let light = lamp(vec3(x, 1.3, 0.0));
+        check(
+            "light inside",
+            &closed,
+            &light,
+            &[(eye, vec3(3.0, 0.0, 0.0), SHADOW), (eye, vec3(0.0, 0.0, 5.0), SHADOW), (eye, vec3(0.0, 2.0, 0.0), AWAY)],
+        );
+    }
+    let two_sided = scene(vec![ground(10.0), with(room, |_, m| m.double_sided = true)]);
+    let inside = vec3(0.1, 1.2, 0.3);
+    check("both inside", &two_sided, &lamp(vec3(0.5, 1.5, 0.0)), &[(inside, vec3(1.0, 1.0, 0.0), LIT)]);
+    check(
+        "eye inside, walls of one side",
+        &closed,
+        &sun(vec3(1.0, -1.0, 0.0)),
+        &[(inside, vec3(2.5, 0.0, 0.3), SHADOW), (inside, vec3(4.0, 0.0, 0.3), LIT)],
+    );
+    check("light behind the caster only", &closed, &lamp(vec3(0.0, 0.5, 4.0)), &[(eye, vec3(0.0, 0.0, 5.0), LIT)]);
+}
+
+#[test]
+fn the_hierarchy_misses_nothing() {
+    // A linear congruence is random enough, and the same everywhere.
+    let mut state = 7_u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1 << 24) as f32 * 2.0 - 1.0
+    };
+    for (offset, reach) in [(0.0, 3.0), (1000.0, 3.0), (0.0, 100_000.0)] {
+        let mut point = |scale: f32| vec3(random(), random(), random()) * scale;
+        let positions: Vec<Vec3> = (0..400)
+            .flat_map(|_| {
+                let at = point(1.0);
+                [at, at + point(0.2), at + point(0.2)]
+            })
+            .map(|p| p + offset)
+            .collect();
+        let tracer = Tracer::new(&scene(vec![drawable(mesh(positions, (0..1200).collect()), Mat4::IDENTITY)]));
+        assert_eq!(tracer.triangle_count(), 400);
+        let mut hits = 0;
+        for _ in 0..3000 {
+            let (origin, target) = (point(reach).as_dvec3() + f64::from(offset), point(1.0).as_dvec3() + f64::from(offset));
+            let ray = Ray::new(origin, (target - origin).normalize());
+            let all = tracer.soup.triangles.iter().enumerate().filter_map(|(i, t)| ray.meets(i, t));
+            let nearest = all.min_by(|a, b| a.distance.total_cmp(&b.distance));
+            assert_eq!(tracer.soup.first(&ray, |_| true), nearest);
+            let Some(nearest) = nearest else { continue };
+            assert!(tracer.soup.any(&ray, nearest.distance + 1e-6, |_| true));
+            assert!(!tracer.soup.any(&ray, nearest.distance, |_| true));
+            hits += 1;
+        }
+        assert!(hits > 500, "{hits}");
+    }
+}
+
+#[test]
+fn bad_input_is_an_error_or_nothing() {
+    let no_mesh =
+        Drawable { mesh: Arc::new(mesh(vec![Vec3::ZERO, Vec3::NAN, Vec3::X], vec![0, 1, 2, 0, 0, 2, 5, 6, 7])), ..ground(1.0) };
+    let empty = scene(vec![no_mesh]);
+    let view = view(Vec3::ONE * 3.0, Vec3::ZERO, [8, 6]);
+    let options = TraceOptions { sub_samples: 0, ..TraceOptions::default() };
+    let trace = |light: Light, view: &View| trace_visibility(&Scene { lights: vec![light], ..empty.clone() }, 0, view, &options);
+    assert_eq!(trace(sun(Vec3::NEG_Y), &view), Ok(Mask::background(8, 6)));
+    assert_eq!(trace(sun(Vec3::NEG_Y), &View { size: [0, 6], ..view.clone() }), Ok(Mask::background(0, 6)));
+    for light in [sun(Vec3::ZERO), sun(Vec3::NAN), lamp(Vec3::INFINITY)] {
+        assert!(matches!(trace(light, &view), Err(TraceError::BadLight { .. })));
+    }
+    let flat = Frustum { left: 1.0, right: 1.0, ..view.frustum };
+    for bad in [View { view_from_world: Mat4::ZERO, ..view.clone() }, View { frustum: flat, ..view.clone() }] {
+        assert!(matches!(trace(sun(Vec3::NEG_Y), &bad), Err(TraceError::BadView { .. })));
+    }
+    assert_eq!(trace_visibility(&empty, 2, &view, &options), Err(TraceError::NoLight { light: 2, count: 0 }));
+    assert_eq!(class(&scene(vec![ground(1.0)]), &lamp(Vec3::ZERO), Vec3::Y, Vec3::ZERO, &options), LIT, "light on the surface");
+}
+
+#[test]
+fn progress_counts_every_row() {
+    let rows = Mutex::new(Vec::new());
+    let tracer = Tracer::new(&scene(vec![ground(1.0)]));
+    let view = view(vec3(0.0, 2.0, 2.0), Vec3::ZERO, [16, 40]);
+    let mask = tracer.visibility(&sun(Vec3::NEG_Y), &view, &TraceOptions::default(), &|n| rows.lock().unwrap().push(n)).unwrap();
+    let mut rows = rows.into_inner().unwrap();
+    rows.sort_unstable();
+    assert_eq!(rows, (1..=40).collect::<Vec<u32>>());
+    // The square is seen as a trapezium without holes, its border is mixed, all else is background.
+    assert!(mask.count(LIT) > 100 && mask.count(Mask::MIXED) > 20 && mask.count(BACKGROUND) > 100);
+    assert_eq!(mask.count(LIT) + mask.count(Mask::MIXED) + mask.count(BACKGROUND), 640);
+    assert_eq!(mask, tracer.visibility(&sun(Vec3::NEG_Y), &view, &TraceOptions::default(), &|_| ()).unwrap());
+    assert!(dvec3(0.0, 2.0, 2.0).distance(Camera::new(&view, 1).unwrap().eye) < 1e-6);
+}
