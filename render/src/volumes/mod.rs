@@ -10,6 +10,12 @@
 //!
 //! This module knows nothing of lighting, materials or how the stencil is used afterwards.
 
+mod cache;
+mod draw;
+mod extract;
+mod parts;
+
+use extract::{Lists, Wanted};
 use glam::{Mat4, Vec4};
 use std::sync::Arc;
 use umbriel_scene::{Aabb, Mesh};
@@ -59,12 +65,17 @@ pub struct VolumeStats {
 }
 
 /// Makes and draws the volumes of all jobs of a frame.
-pub struct VolumePass {}
+pub struct VolumePass {
+    extract: extract::Extract,
+    drawing: draw::Drawing,
+    meshes: cache::MeshCache,
+    jobs: Vec<Vec<Lists>>,
+}
 
 impl VolumePass {
-    /// `view_layout` is the layout of bind group 0, the View uniform of `shaders/view.wgsl`. The pass that is drawn in
-    /// has a depth and stencil attachment of `depth_stencil_format` with `sample_count` samples, and one colour
-    /// attachment of `colour_format` (none for `None`).
+    /// `view_layout` is the layout of bind group 0, the View uniform of `shaders/view.wgsl`, visible to vertex shaders.
+    /// The pass that is drawn in has a depth and stencil attachment of `depth_stencil_format` with `sample_count`
+    /// samples, and one colour attachment of `colour_format` (none for `None`).
     pub fn new(
         device: &wgpu::Device,
         depth_stencil_format: wgpu::TextureFormat,
@@ -72,8 +83,14 @@ impl VolumePass {
         colour_format: Option<wgpu::TextureFormat>,
         view_layout: &wgpu::BindGroupLayout,
     ) -> VolumePass {
-        let _ = (device, depth_stencil_format, sample_count, colour_format, view_layout);
-        VolumePass {}
+        let placed_layout = draw::placed_layout(device);
+        let target = draw::Target { depth_stencil_format, sample_count, colour_format };
+        VolumePass {
+            extract: extract::Extract::new(device, &placed_layout),
+            drawing: draw::Drawing::new(device, target, view_layout, &placed_layout),
+            meshes: cache::MeshCache::default(),
+            jobs: Vec::new(),
+        }
     }
 
     /// Makes the lists of every job. Once per submission, before the passes that draw them.
@@ -84,13 +101,77 @@ impl VolumePass {
         encoder: &mut wgpu::CommandEncoder,
         jobs: &[VolumeJob],
     ) -> VolumeStats {
-        let _ = (device, queue, encoder, jobs);
-        VolumeStats::default()
+        let mut stats = VolumeStats::default();
+        let mut stale = Vec::new();
+        let mut old_jobs = std::mem::take(&mut self.jobs).into_iter();
+        for (j, job) in jobs.iter().enumerate() {
+            let mut old = OldLists::new(old_jobs.next().unwrap_or_default());
+            let mut lists = Vec::new();
+            for caster in &job.casters {
+                let vertex_count = caster.mesh.positions.len() as u32;
+                let parts = self.meshes.parts(device, &caster.mesh);
+                if parts.is_empty() || caster.positions.size() < 12 * u64::from(vertex_count) {
+                    stats.left_out += 1;
+                    continue;
+                }
+                for part in parts {
+                    let wanted = Wanted {
+                        light: &job.light,
+                        part,
+                        positions: &caster.positions,
+                        positions_revision: caster.positions_revision,
+                        world_from_object: caster.world_from_object,
+                        bounds_in_world: &caster.bounds_in_world,
+                        vertex_count,
+                    };
+                    match self.extract.lists(device, queue, &wanted, old.take(part)) {
+                        Some((made, anew)) => {
+                            if anew {
+                                stale.push((j, lists.len()));
+                                stats.extracted += 1;
+                            } else {
+                                stats.kept += 1;
+                            }
+                            lists.push(made);
+                        }
+                        None => stats.left_out += 1,
+                    }
+                }
+            }
+            self.jobs.push(lists);
+        }
+        let stale: Vec<&Lists> = stale.into_iter().map(|(job, place)| &self.jobs[job][place]).collect();
+        self.extract.run(encoder, &stale);
+        self.meshes.forget_dead();
+        stats
     }
 
-    /// Counts the volumes of a job into the stencil, which must be 0. Depth is read, stencil written, colour untouched.
-    /// Depth is reversed with its far plane at infinity, and cleared to 0.
+    /// Counts the volumes of a job into the stencil, which must be 0 in the viewport; afterwards it is 0 where the light
+    /// shines. Depth is read, stencil written, colour untouched; the stencil reference is changed. Depth is reversed,
+    /// with its far plane at infinity, and cleared to 0.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, job: usize, view: &wgpu::BindGroup) {
-        let _ = (pass, job, view);
+        if let Some(lists) = self.jobs.get(job) {
+            self.drawing.run(pass, lists, view);
+        }
+    }
+}
+
+/// The lists of a job in the frame before, to be taken up again.
+struct OldLists {
+    lists: Vec<Option<Lists>>,
+    next: usize,
+}
+
+impl OldLists {
+    fn new(lists: Vec<Lists>) -> OldLists {
+        OldLists { lists: lists.into_iter().map(Some).collect(), next: 0 }
+    }
+
+    /// The next list of this part; casters mostly keep their order, so it is near.
+    fn take(&mut self, part: &Arc<cache::GpuPart>) -> Option<Lists> {
+        let (before, after) = (0..self.next, self.next..self.lists.len());
+        let place = after.chain(before).find(|i| self.lists[*i].as_ref().is_some_and(|l| Arc::ptr_eq(&l.part, part)))?;
+        self.next = place + 1;
+        self.lists[place].take()
     }
 }

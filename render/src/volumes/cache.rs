@@ -1,0 +1,67 @@
+//! Triangles and edges of meshes on the GPU, kept as long as their mesh lives.
+
+use super::parts::{self, Part};
+use std::collections::HashMap;
+use std::sync::{Arc, Weak};
+use umbriel_scene::Mesh;
+use wgpu::util::DeviceExt;
+
+/// A [`Part`] on the GPU.
+pub(super) struct GpuPart {
+    pub(super) triangle_count: u32,
+    pub(super) edge_count: u32,
+    pub(super) layers: u32,
+    pub(super) triangles: wgpu::Buffer,
+    pub(super) edges: wgpu::Buffer,
+    pub(super) incidences: wgpu::Buffer,
+}
+
+/// Parts of all meshes that were ever asked for and still live.
+#[derive(Default)]
+pub(super) struct MeshCache {
+    // The weak pointer keeps the address from being used again.
+    meshes: HashMap<*const Mesh, (Weak<Mesh>, Vec<Arc<GpuPart>>)>,
+}
+
+impl MeshCache {
+    /// The parts of a mesh; none where it has no triangle with an area of its own.
+    pub(super) fn parts(&mut self, device: &wgpu::Device, mesh: &Arc<Mesh>) -> &[Arc<GpuPart>] {
+        let upload = || {
+            let parts = parts::parts(mesh);
+            if parts.len() == 1 && parts[0].layers > parts::STENCIL_LAYERS {
+                tracing::debug!(
+                    mesh = mesh.name,
+                    "loose pieces may put more than {} layers of shadow over a point; at an exact multiple it would be lit",
+                    parts::STENCIL_LAYERS
+                );
+            }
+            (Arc::downgrade(mesh), parts.iter().map(|p| Arc::new(GpuPart::new(device, p))).collect())
+        };
+        &self.meshes.entry(Arc::as_ptr(mesh)).or_insert_with(upload).1
+    }
+
+    /// Forgets meshes that nobody holds any more.
+    pub(super) fn forget_dead(&mut self) {
+        self.meshes.retain(|_, (mesh, _)| mesh.strong_count() > 0);
+    }
+}
+
+impl GpuPart {
+    fn new(device: &wgpu::Device, part: &Part) -> GpuPart {
+        let buffer = |label, contents: &[u8]| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage: wgpu::BufferUsages::STORAGE,
+            })
+        };
+        GpuPart {
+            triangle_count: part.triangles.len() as u32,
+            edge_count: part.edges.len() as u32,
+            layers: part.layers,
+            triangles: buffer("volume triangles", bytemuck::cast_slice(&part.triangles)),
+            edges: buffer("volume edges", bytemuck::cast_slice(&part.edges)),
+            incidences: buffer("volume incidences", bytemuck::cast_slice(&part.incidences)),
+        }
+    }
+}

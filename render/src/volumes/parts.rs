@@ -1,0 +1,231 @@
+//! What of a mesh casts: connected surfaces, how they are wound, and how many layers of shadow they may put over a point.
+
+use umbriel_scene::{Edges, Mesh};
+
+/// Layers that one stencil group may hold where the eighth bit keeps what groups before it shadowed.
+pub(super) const GROUP_LAYERS: u32 = 127;
+/// Layers that the stencil holds when a single group fills it.
+pub(super) const STENCIL_LAYERS: u32 = 255;
+/// A mesh of very many loose pieces is not cut further than this.
+const MAX_PARTS: usize = 8;
+/// Layers set aside for one connected surface that is not convex.
+const BENT_SURFACE_LAYERS: u32 = 8;
+
+/// Surfaces of a mesh that are cast together.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Part {
+    /// Three vertices, and 1 where the closed surface is wound outward, 2 inward, 0 where it is open or inconsistent.
+    pub(super) triangles: Vec<[u32; 4]>,
+    /// Vertices a and b, first and number of the incidences.
+    pub(super) edges: Vec<[u32; 4]>,
+    /// Triangle << 1, plus 1 where the triangle runs from b to a.
+    pub(super) incidences: Vec<u32>,
+    /// Layers it may put over a point.
+    pub(super) layers: u32,
+}
+
+/// Cuts a mesh into parts of at most [`GROUP_LAYERS`] layers each, or into a single one where [`STENCIL_LAYERS`] do.
+pub(super) fn parts(mesh: &Mesh) -> Vec<Part> {
+    let edges = Edges::of_mesh(mesh);
+    let triangle = |t: u32| [0, 1, 2].map(|i| mesh.indices[3 * t as usize + i]);
+    let (surface_of, count) = connected(mesh.triangle_count(), &edges);
+    let surfaces = surfaces(mesh, &edges, &surface_of, count);
+    let (part_of, layers) = distribute(surfaces.iter().map(|s| s.layers));
+    let mut parts: Vec<Part> = layers.iter().map(|&layers| Part { layers, ..Part::default() }).collect();
+    let mut place = vec![0; surface_of.len()];
+    for (t, &surface) in (0u32..).zip(&surface_of).filter(|(_, s)| **s != NONE) {
+        let part = &mut parts[part_of[surface as usize]];
+        place[t as usize] = part.triangles.len() as u32;
+        let [a, b, c] = triangle(t);
+        part.triangles.push([a, b, c, surfaces[surface as usize].winding]);
+    }
+    for edge in &edges.edges {
+        let incidences = &edges.incidences[edge.first as usize..][..edge.count as usize];
+        let part = &mut parts[part_of[surface_of[(incidences[0] >> 1) as usize] as usize]];
+        part.edges.push([edge.a, edge.b, part.incidences.len() as u32, edge.count]);
+        part.incidences.extend(incidences.iter().map(|i| place[(i >> 1) as usize] << 1 | (i & 1)));
+    }
+    parts
+}
+
+/// The surface of a degenerate triangle.
+const NONE: u32 = u32::MAX;
+
+/// Triangles connected through edges.
+#[derive(Clone)]
+struct Surface {
+    /// As in [`Part::triangles`].
+    winding: u32,
+    /// As in [`Part::layers`].
+    layers: u32,
+}
+
+/// The surface of each triangle, in the order of their first triangles, and their number.
+fn connected(triangle_count: usize, edges: &Edges) -> (Vec<u32>, usize) {
+    let mut parent = vec![NONE; triangle_count];
+    fn root(parent: &mut [u32], mut i: u32) -> u32 {
+        if parent[i as usize] == NONE {
+            parent[i as usize] = i;
+        }
+        while parent[i as usize] != i {
+            parent[i as usize] = parent[parent[i as usize] as usize];
+            i = parent[i as usize];
+        }
+        i
+    }
+    for edge in &edges.edges {
+        let first = root(&mut parent, edges.incidences[edge.first as usize] >> 1);
+        for (t, _) in edges.triangles(edge).skip(1) {
+            let other = root(&mut parent, t);
+            parent[other as usize] = first;
+        }
+    }
+    let mut number = vec![NONE; triangle_count];
+    let mut next = 0;
+    let of = (0..triangle_count as u32).map(|i| {
+        if parent[i as usize] == NONE {
+            return NONE;
+        }
+        let r = root(&mut parent, i) as usize;
+        if number[r] == NONE {
+            number[r] = next;
+            next += 1;
+        }
+        number[r]
+    });
+    (of.collect(), next as usize)
+}
+
+/// Finds out which surfaces are closed, how these are wound, and which are convex.
+fn surfaces(mesh: &Mesh, edges: &Edges, surface_of: &[u32], count: usize) -> Vec<Surface> {
+    #[derive(Clone, Copy, Default)]
+    struct Sums {
+        faces: u32,
+        open: bool,
+        bent: bool,
+        // Vertices and edges counted twice where surfaces touch only make the bound of layers wider.
+        euler: i64,
+        volume: f64,
+        volume_scale: f64,
+        origin: Option<glam::DVec3>,
+    }
+    let at = |i: u32| mesh.positions[i as usize].as_dvec3();
+    let triangle = |t: u32| [0, 1, 2].map(|i| mesh.indices[3 * t as usize + i]);
+    let mut sums = vec![Sums::default(); count];
+    for (t, &surface) in (0u32..).zip(surface_of).filter(|(_, s)| **s != NONE) {
+        let s = &mut sums[surface as usize];
+        let [a, b, c] = triangle(t).map(at);
+        let origin = *s.origin.get_or_insert(a);
+        let volume = (a - origin).dot((b - origin).cross(c - origin));
+        s.volume += volume;
+        s.volume_scale += volume.abs();
+        s.faces += 1;
+        s.euler += 1;
+    }
+    let mut seen = vec![NONE; mesh.positions.len()];
+    for edge in &edges.edges {
+        let incidences: Vec<(u32, i32)> = edges.triangles(edge).take(3).collect();
+        let surface = surface_of[incidences[0].0 as usize];
+        let s = &mut sums[surface as usize];
+        s.euler -= 1;
+        for i in [edge.a, edge.b] {
+            if std::mem::replace(&mut seen[i as usize], surface) != surface {
+                s.euler += 1;
+            }
+        }
+        match incidences[..] {
+            [(one, sign), (other, against)] if sign != against => {
+                let [p, q, r] = triangle(one).map(at);
+                let n = (q - p).cross(r - p) * s.volume.signum();
+                s.bent |= triangle(other).iter().any(|&i| n.dot(at(i) - p) > 1e-6 * n.length() * (at(i) - p).length());
+            }
+            _ => s.open = true,
+        }
+    }
+    let finish = |s: Sums| {
+        let solid = !s.open && s.volume.abs() > 1e-6 * s.volume_scale;
+        let convex = solid && !s.bent && s.euler == 2;
+        Surface {
+            winding: if !solid { 0 } else if s.volume > 0.0 { 1 } else { 2 },
+            layers: if convex { 1 } else { s.faces.min(BENT_SURFACE_LAYERS) },
+        }
+    };
+    sums.into_iter().map(finish).collect()
+}
+
+/// Part of each surface, and the layers of each part. Beyond [`MAX_PARTS`] it is one part again, with all layers.
+fn distribute(layers: impl Iterator<Item = u32>) -> (Vec<usize>, Vec<u32>) {
+    let mut part_layers = Vec::new();
+    let mut part_of = Vec::new();
+    for l in layers {
+        match part_layers.last_mut() {
+            Some(sum) if *sum + l <= GROUP_LAYERS => *sum += l,
+            _ => part_layers.push(l),
+        }
+        part_of.push(part_layers.len() - 1);
+    }
+    let total: u32 = part_layers.iter().sum();
+    if part_layers.len() > 1 && (total <= STENCIL_LAYERS || part_layers.len() > MAX_PARTS) {
+        return (vec![0; part_of.len()], vec![total]);
+    }
+    (part_of, part_layers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+    use std::sync::Arc;
+
+    const CORNERS: [[f32; 3]; 8] =
+        [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [1., 1., 0.], [0., 0., 1.], [1., 0., 1.], [0., 1., 1.], [1., 1., 1.]];
+    const OUTWARD: [u32; 36] =
+        [0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5];
+
+    fn boxes(count: usize, indices: &[u32]) -> Mesh {
+        let corner = |n: usize| CORNERS.map(|c| Vec3::from(c) * (n + 1) as f32 - Vec3::splat(n as f32 * 0.5));
+        Mesh {
+            positions: (0..count).flat_map(corner).collect(),
+            indices: (0..count as u32).flat_map(|n| indices.iter().map(move |i| 8 * n + i)).collect(),
+            ..Mesh::default()
+        }
+    }
+
+    #[test]
+    fn surfaces_are_recognised() {
+        let inward: Vec<u32> = OUTWARD.chunks(3).flat_map(|t| [t[0], t[2], t[1]]).collect();
+        let mut mixed = OUTWARD;
+        mixed.swap(1, 2);
+        let mut dented = boxes(1, &OUTWARD);
+        Arc::make_mut(&mut dented.positions)[7] = Vec3::splat(0.3);
+        // Name, mesh, triangles of each part, their winding, layers of each part.
+        let rows: Vec<(&str, Mesh, Vec<usize>, u32, Vec<u32>)> = vec![
+            ("nothing", Mesh::default(), vec![], 0, vec![]),
+            ("outward", boxes(1, &OUTWARD), vec![12], 1, vec![1]),
+            ("inward", boxes(1, &inward), vec![12], 2, vec![1]),
+            ("inconsistent", boxes(1, &mixed), vec![12], 0, vec![8]),
+            ("open", boxes(1, &OUTWARD[..30]), vec![10], 0, vec![8]),
+            ("dented", dented, vec![12], 1, vec![8]),
+            ("degenerate triangles are dropped", boxes(1, &[0, 0, 1, 0, 1, 2]), vec![1], 0, vec![1]),
+            ("many", boxes(200, &OUTWARD), vec![2400], 1, vec![200]),
+            ("too many for one stencil", boxes(300, &OUTWARD), vec![127 * 12, 127 * 12, 46 * 12], 1, vec![127, 127, 46]),
+            ("loose leaves", boxes(800, &OUTWARD[..6]), vec![1600], 0, vec![1600]),
+        ];
+        for (name, mesh, triangles, winding, layers) in rows {
+            let parts = parts(&mesh);
+            assert_eq!(parts.iter().map(|p| p.triangles.len()).collect::<Vec<_>>(), triangles, "{name}");
+            assert_eq!(parts.iter().map(|p| p.layers).collect::<Vec<_>>(), layers, "{name}");
+            for part in parts {
+                assert!(part.triangles.iter().all(|t| t[3] == winding), "{name}");
+                assert_eq!(part.incidences.len(), 3 * part.triangles.len(), "{name}");
+                for [a, b, first, count] in part.edges {
+                    for i in &part.incidences[first as usize..][..count as usize] {
+                        let [p, q, r, _] = part.triangles[(i >> 1) as usize];
+                        let (from, to) = if i & 1 == 0 { (a, b) } else { (b, a) };
+                        assert!([(p, q), (q, r), (r, p)].contains(&(from, to)), "{name}");
+                    }
+                }
+            }
+        }
+    }
+}
