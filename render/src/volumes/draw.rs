@@ -45,10 +45,7 @@ pub(super) fn placed_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     };
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("volume caster"),
-        entries: &[
-            entry(0, wgpu::BufferBindingType::Uniform),
-            entry(1, wgpu::BufferBindingType::Storage { read_only: true }),
-        ],
+        entries: &[entry(0, wgpu::BufferBindingType::Uniform), entry(1, wgpu::BufferBindingType::Storage { read_only: true })],
     })
 }
 
@@ -63,11 +60,8 @@ fn z_fail(write_mask: u32, turned: bool) -> (CompareFunction, wgpu::StencilState
 
 /// Where any bit counts, the count is dropped and the eighth bit set.
 fn remembering() -> (CompareFunction, wgpu::StencilState) {
-    let face = wgpu::StencilFaceState {
-        compare: CompareFunction::NotEqual,
-        pass_op: StencilOperation::Replace,
-        ..Default::default()
-    };
+    let face =
+        wgpu::StencilFaceState { compare: CompareFunction::NotEqual, pass_op: StencilOperation::Replace, ..Default::default() };
     (CompareFunction::Always, wgpu::StencilState { front: face, back: face, read_mask: COUNT_BITS, write_mask: 0xff })
 }
 

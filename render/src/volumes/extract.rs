@@ -165,12 +165,11 @@ impl Extract {
         if stale.is_empty() {
             return;
         }
-        let mut pass = encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("volume extraction"), timestamp_writes: None });
-        for (pipeline, count) in [
-            (&self.turn_triangles, (|p| p.triangle_count) as fn(&GpuPart) -> u32),
-            (&self.raise_edges, |p| p.edge_count),
-        ] {
+        let mut pass =
+            encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("volume extraction"), timestamp_writes: None });
+        for (pipeline, count) in
+            [(&self.turn_triangles, (|p| p.triangle_count) as fn(&GpuPart) -> u32), (&self.raise_edges, |p| p.edge_count)]
+        {
             pass.set_pipeline(pipeline);
             for lists in stale {
                 let groups = count(&lists.part).div_ceil(64);
@@ -207,8 +206,7 @@ impl Extract {
             Some(old) if old.key == key => return Some((old, false)),
             Some(old) if old.key.positions == key.positions => Lists { key, ..old },
             Some(old) => {
-                let (bind_group, placed) =
-                    self.bind_groups(device, wanted, [&old.uniform, &old.casts, &old.draws, &old.indices]);
+                let (bind_group, placed) = self.bind_groups(device, wanted, [&old.uniform, &old.casts, &old.draws, &old.indices]);
                 Lists { key, bind_group, placed, ..old }
             }
             None => {

@@ -146,7 +146,13 @@ fn surfaces(mesh: &Mesh, edges: &Edges, surface_of: &[u32], count: usize) -> Vec
         let solid = !s.open && s.volume.abs() > 1e-6 * s.volume_scale;
         let convex = solid && !s.bent && s.euler == 2;
         Surface {
-            winding: if !solid { 0 } else if s.volume > 0.0 { 1 } else { 2 },
+            winding: if !solid {
+                0
+            } else if s.volume > 0.0 {
+                1
+            } else {
+                2
+            },
             layers: if convex { 1 } else { s.faces.min(BENT_SURFACE_LAYERS) },
         }
     };
