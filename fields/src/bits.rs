@@ -1,0 +1,121 @@
+//! A set of small numbers that gives its lowest member quickly: bits, and bits over the words of bits below, up to one word.
+
+/// Ordered set of numbers below its capacity.
+#[derive(Debug, Default)]
+pub(crate) struct BitSet {
+    /// `levels[0]` holds the members; a bit of `levels[n + 1]` says that a word of `levels[n]` is not zero. The last level is one word.
+    levels: Vec<Vec<u64>>,
+}
+
+impl BitSet {
+    /// Makes room for numbers below `capacity`; keeps the members.
+    pub(crate) fn reserve(&mut self, capacity: usize) {
+        if capacity <= self.levels.first().map_or(0, |level| level.len() * 64) {
+            return;
+        }
+        let members: Vec<usize> = std::iter::from_fn(|| self.pop_lowest()).collect();
+        self.levels.clear();
+        let mut words = capacity.next_power_of_two().max(64) / 64;
+        loop {
+            self.levels.push(vec![0; words]);
+            if words == 1 {
+                break;
+            }
+            words = words.div_ceil(64);
+        }
+        members.into_iter().for_each(|member| self.insert(member));
+    }
+
+    /// Adds a number below the capacity.
+    #[inline]
+    pub(crate) fn insert(&mut self, number: usize) {
+        let mut at = number;
+        for level in &mut self.levels {
+            let word = &mut level[at / 64];
+            let was_empty = *word == 0;
+            *word |= 1 << (at % 64);
+            if !was_empty {
+                return;
+            }
+            at /= 64;
+        }
+    }
+
+    /// Takes the lowest number out.
+    #[inline]
+    pub(crate) fn pop_lowest(&mut self) -> Option<usize> {
+        let mut at = 0;
+        for level in self.levels.iter().rev() {
+            let word = level[at];
+            if word == 0 {
+                return None;
+            }
+            at = at * 64 + word.trailing_zeros() as usize;
+        }
+        let lowest = at;
+        for level in &mut self.levels {
+            let word = &mut level[at / 64];
+            *word &= !(1 << (at % 64));
+            if *word != 0 {
+                break;
+            }
+            at /= 64;
+        }
+        (!self.levels.is_empty()).then_some(lowest)
+    }
+
+    /// True if the number is a member.
+    pub(crate) fn contains(&self, number: usize) -> bool {
+        self.levels.first().and_then(|level| level.get(number / 64)).is_some_and(|word| word >> (number % 64) & 1 == 1)
+    }
+
+    /// Takes a number out.
+    pub(crate) fn remove(&mut self, number: usize) {
+        if !self.contains(number) {
+            return;
+        }
+        let mut at = number;
+        for level in &mut self.levels {
+            level[at / 64] &= !(1 << (at % 64));
+            if level[at / 64] != 0 {
+                return;
+            }
+            at /= 64;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn gives_its_members_in_order() {
+        for capacity in [1, 64, 65, 4096, 5000, 300_000] {
+            let mut set = BitSet::default();
+            let mut model = BTreeSet::new();
+            let mut random = 88172645463325252u64;
+            for step in 0..4000 {
+                random ^= random << 13;
+                random ^= random >> 7;
+                random ^= random << 17;
+                let number = (random >> 20) as usize % capacity;
+                set.reserve(if step < 10 { number + 1 } else { capacity });
+                match random % 5 {
+                    0 => assert_eq!(set.pop_lowest(), model.pop_first()),
+                    1 => {
+                        set.remove(number);
+                        model.remove(&number);
+                    }
+                    _ => {
+                        set.insert(number);
+                        model.insert(number);
+                    }
+                }
+                assert_eq!(set.contains(number), model.contains(&number));
+            }
+            assert_eq!(std::iter::from_fn(|| set.pop_lowest()).collect::<Vec<_>>(), model.into_iter().collect::<Vec<_>>());
+        }
+    }
+}

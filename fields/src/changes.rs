@@ -1,0 +1,163 @@
+//! The one question: what was written after revision N? A bounded log of the nodes that were written, in segments between the
+//! revisions that readers asked for.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::NodeId;
+
+/// Counts writes: every write takes the next one. Zero is before the first.
+pub type Revision = u64;
+
+/// What was written since a revision.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Changes {
+    /// Nodes written, created or deleted, each once; of those that do not exist any more, only the id is left.
+    Nodes(Vec<NodeId>),
+    /// The revision is too old to know: look at all nodes.
+    All,
+}
+
+/// A log shorter than this is never cut.
+const SMALLEST_LIMIT: usize = 65_536;
+
+/// Who was written when.
+#[derive(Debug, Default)]
+pub(crate) struct ChangeLog {
+    /// Of the last write.
+    revision: Revision,
+    /// By node slot: the revision of the node's last write.
+    nodes: Vec<Revision>,
+    /// The last revision that a reader asked for. A node is logged again only if it was not written since.
+    boundary: AtomicU64,
+    /// Slots of nodes, in the order of their first write after their segment's boundary.
+    log: VecDeque<u32>,
+    /// Boundary, and where in the log its segment starts, counted from the first entry ever logged.
+    segments: VecDeque<(Revision, usize)>,
+    /// How many entries were dropped from the front of the log.
+    dropped: usize,
+    deleted: VecDeque<(Revision, NodeId)>,
+    /// Questions about older revisions cannot be answered.
+    floor: Revision,
+}
+
+impl ChangeLog {
+    /// The next revision, for a write that happens now.
+    #[inline]
+    pub(crate) fn next(&mut self) -> Revision {
+        self.revision += 1;
+        self.revision
+    }
+
+    /// The revision of the last write, without making it a boundary.
+    #[inline]
+    pub(crate) fn last(&self) -> Revision {
+        self.revision
+    }
+
+    /// The revision of the last write, for a reader who will ask what changed since.
+    pub(crate) fn boundary(&self) -> Revision {
+        self.boundary.store(self.revision, Ordering::Relaxed);
+        self.revision
+    }
+
+    pub(crate) fn node(&self, slot: u32) -> Revision {
+        self.nodes[slot as usize]
+    }
+
+    pub(crate) fn grow(&mut self, slots: usize) {
+        if self.nodes.len() < slots {
+            self.nodes.resize(slots, 0);
+        }
+    }
+
+    /// Notes a write of a node.
+    #[inline]
+    pub(crate) fn wrote(&mut self, slot: u32, revision: Revision) {
+        let boundary = *self.boundary.get_mut();
+        let last = &mut self.nodes[slot as usize];
+        let unlogged = *last <= boundary;
+        *last = revision;
+        if unlogged {
+            self.append(slot, boundary);
+        }
+    }
+
+    #[inline]
+    fn append(&mut self, slot: u32, boundary: Revision) {
+        if self.segments.back().is_none_or(|(start, _)| *start != boundary) {
+            self.segments.push_back((boundary, self.dropped + self.log.len()));
+            self.cut();
+        }
+        self.log.push_back(slot);
+    }
+
+    pub(crate) fn deleted(&mut self, id: NodeId, revision: Revision) {
+        self.deleted.push_back((revision, id));
+        if self.deleted.len() > self.limit() {
+            self.floor = self.floor.max(self.deleted[self.deleted.len() / 2].0);
+            self.forget_below_floor();
+        }
+    }
+
+    fn limit(&self) -> usize {
+        SMALLEST_LIMIT.max(4 * self.nodes.len())
+    }
+
+    /// Drops the older half once the log is too long.
+    fn cut(&mut self) {
+        if self.log.len() <= self.limit() {
+            return;
+        }
+        let keep_from = self.dropped + self.log.len() / 2;
+        let first_kept = self.segments.partition_point(|(_, start)| *start < keep_from).min(self.segments.len() - 1);
+        self.floor = self.floor.max(self.segments[first_kept].0);
+        self.forget_below_floor();
+    }
+
+    fn forget_below_floor(&mut self) {
+        let floor = self.floor;
+        // The segment that the floor lies in must stay.
+        let first_kept = self.segments.partition_point(|(boundary, _)| *boundary <= floor).saturating_sub(1);
+        self.segments.drain(..first_kept);
+        if let Some((_, start)) = self.segments.front() {
+            self.log.drain(..start - self.dropped);
+            self.dropped = *start;
+        }
+        let gone = self.deleted.partition_point(|(revision, _)| *revision <= floor);
+        self.deleted.drain(..gone);
+    }
+
+    /// Nodes written or deleted after a revision. `ids` by slot; dead slots hold null.
+    pub(crate) fn since(&self, revision: Revision, ids: &[NodeId]) -> Changes {
+        if revision < self.floor {
+            return Changes::All;
+        }
+        if revision >= self.revision {
+            return Changes::Nodes(Vec::new());
+        }
+        let segment = self.segments.partition_point(|(boundary, _)| *boundary <= revision).saturating_sub(1);
+        let start = self.segments.get(segment).map_or(0, |(_, start)| start - self.dropped);
+        let mut slots: Vec<u32> = self.log.range(start..).copied().filter(|slot| self.nodes[*slot as usize] > revision).collect();
+        if segment + 1 < self.segments.len() {
+            slots.sort_unstable();
+            slots.dedup();
+        }
+        let deleted = self.deleted.partition_point(|(at, _)| *at <= revision);
+        let dead = self.deleted.range(deleted..).map(|(_, id)| *id);
+        let alive = slots.into_iter().map(|slot| ids[slot as usize]).filter(|id| *id != NodeId::default());
+        Changes::Nodes(alive.chain(dead).collect())
+    }
+
+    /// For tests: lengths of log and deletions, which are bounded by the limit.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        if self.log.len() > 2 * self.limit() || self.deleted.len() > self.limit() + 1 {
+            return Err(format!("the change log holds {} entries and {} deletions", self.log.len(), self.deleted.len()));
+        }
+        let ordered = self.segments.iter().zip(self.segments.iter().skip(1)).all(|(a, b)| a.0 < b.0 && a.1 < b.1);
+        if !ordered || self.segments.front().is_some_and(|(_, start)| *start != self.dropped) {
+            return Err("the segments of the change log are out of order".into());
+        }
+        Ok(())
+    }
+}

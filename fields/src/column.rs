@@ -1,0 +1,126 @@
+//! Storage: one growable vector per field type, so that a route copies between two places of one array.
+
+use crate::kind::for_each_kind;
+use crate::{FieldType, FieldValue, Kind, Revision, Value};
+
+/// No node owns the slot.
+pub(crate) const FREE: u32 = u32::MAX;
+
+/// All values of one field type. Slots of deleted fields are used again.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Column<T> {
+    pub(crate) values: Vec<T>,
+    /// The revision of the last write of each slot.
+    pub(crate) revisions: Vec<Revision>,
+    /// The node's slot and the field's index, or `FREE`.
+    pub(crate) owners: Vec<(u32, u16)>,
+    free: Vec<u32>,
+}
+
+impl<T> Default for Column<T> {
+    fn default() -> Self {
+        Self { values: Vec::new(), revisions: Vec::new(), owners: Vec::new(), free: Vec::new() }
+    }
+}
+
+impl<T: FieldValue> Column<T> {
+    fn insert(&mut self, value: T, owner: (u32, u16), revision: Revision) -> u32 {
+        if let Some(slot) = self.free.pop() {
+            let at = slot as usize;
+            (self.values[at], self.revisions[at], self.owners[at]) = (value, revision, owner);
+            return slot;
+        }
+        self.values.push(value);
+        self.revisions.push(revision);
+        self.owners.push(owner);
+        (self.values.len() - 1) as u32
+    }
+
+    fn remove(&mut self, slot: u32) {
+        self.values[slot as usize] = T::empty();
+        self.owners[slot as usize] = (FREE, 0);
+        self.free.push(slot);
+    }
+
+    /// Writes unless `compare` and nothing would change; says whether it wrote.
+    #[inline]
+    pub(crate) fn write(&mut self, slot: u32, value: T, compare: bool, revision: Revision) -> bool {
+        let place = &mut self.values[slot as usize];
+        if compare && place.same(&value) {
+            return false;
+        }
+        *place = value;
+        self.revisions[slot as usize] = revision;
+        true
+    }
+}
+
+macro_rules! columns {
+    ($(($one:ident, $many:ident, $type:ty, $one_column:ident, $many_column:ident, $name:literal, $default:expr))*) => {
+        /// One column per field type.
+        #[doc(hidden)]
+        #[derive(Debug, Default)]
+        pub struct Columns { $(
+            pub(crate) $one_column: Column<$type>,
+            pub(crate) $many_column: Column<std::sync::Arc<[$type]>>,
+        )* }
+
+        impl Columns {
+            /// Takes a slot for a value.
+            pub(crate) fn insert(&mut self, value: Value, owner: (u32, u16), revision: Revision) -> u32 {
+                match value { $(
+                    Value::$one(one) => self.$one_column.insert(one, owner, revision),
+                    Value::$many(many) => self.$many_column.insert(many, owner, revision),
+                )* }
+            }
+
+            /// Gives a slot back.
+            pub(crate) fn remove(&mut self, field_type: FieldType, slot: u32) {
+                match (field_type.kind, field_type.multiple) { $(
+                    (Kind::$one, false) => self.$one_column.remove(slot),
+                    (Kind::$one, true) => self.$many_column.remove(slot),
+                )* }
+            }
+
+            pub(crate) fn value(&self, field_type: FieldType, slot: u32) -> Value {
+                match (field_type.kind, field_type.multiple) { $(
+                    (Kind::$one, false) => Value::$one(self.$one_column.values[slot as usize].clone()),
+                    (Kind::$one, true) => Value::$many(self.$many_column.values[slot as usize].clone()),
+                )* }
+            }
+
+            /// Writes a value into a slot of the value's own type.
+            pub(crate) fn write(&mut self, slot: u32, value: Value, compare: bool, revision: Revision) -> bool {
+                match value { $(
+                    Value::$one(one) => self.$one_column.write(slot, one, compare, revision),
+                    Value::$many(many) => self.$many_column.write(slot, many, compare, revision),
+                )* }
+            }
+
+            /// The revisions of all slots of a type.
+            #[inline]
+            pub(crate) fn revisions(&self, field_type: FieldType) -> &[Revision] {
+                match (field_type.kind, field_type.multiple) { $(
+                    (Kind::$one, false) => &self.$one_column.revisions,
+                    (Kind::$one, true) => &self.$many_column.revisions,
+                )* }
+            }
+
+            pub(crate) fn revisions_mut(&mut self, field_type: FieldType) -> &mut [Revision] {
+                match (field_type.kind, field_type.multiple) { $(
+                    (Kind::$one, false) => &mut self.$one_column.revisions,
+                    (Kind::$one, true) => &mut self.$many_column.revisions,
+                )* }
+            }
+
+            pub(crate) fn owners(&self, field_type: FieldType) -> &[(u32, u16)] {
+                match (field_type.kind, field_type.multiple) { $(
+                    (Kind::$one, false) => &self.$one_column.owners,
+                    (Kind::$one, true) => &self.$many_column.owners,
+                )* }
+            }
+        }
+    };
+}
+for_each_kind!(columns);

@@ -1,0 +1,381 @@
+//! A frame: every node that has something to do gets its turn, sources first.
+
+use std::collections::{BTreeSet, HashSet};
+
+use crate::changes::Revision;
+use crate::evaluation::Evaluation;
+use crate::graph::slot_of;
+use crate::program::{Group, copy_group};
+use crate::route::Arrival;
+use crate::schedule::{EVALUATES, IN_TURN, OBSERVED, ROUTED, SILENCED};
+use crate::{Error, Evaluator, FieldId, Graph, Mode, NodeId, Route, RouteId, SetRule, Strength, Value};
+
+/// What the graph asks for while a frame is evaluated. Everything is allowed in these calls but to evaluate the graph: what is created,
+/// connected or written for nodes that had their turn takes part from the next frame on.
+pub trait Host {
+    /// An observed field was written; see [`Graph::observe`].
+    fn field_changed(&mut self, graph: &mut Graph, field: FieldId, token: u64) {
+        let _ = (graph, field, token);
+    }
+
+    /// It is the turn of a node whose type is evaluated by the host.
+    fn evaluate(&mut self, graph: &mut Graph, node: NodeId) {
+        let _ = (graph, node);
+    }
+}
+
+/// A host for graphs without script types and observers.
+pub struct NoHost;
+
+impl Host for NoHost {}
+
+/// Something that an author should know of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    /// Where.
+    pub node: NodeId,
+    /// Which field, if it is about one.
+    pub field: Option<FieldId>,
+    /// What is wrong.
+    pub message: String,
+}
+
+/// What happened in a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameReport {
+    /// Evaluations of nodes.
+    pub evaluated: usize,
+    /// Values written by routes.
+    pub copied: usize,
+    /// What nodes and hosts reported, since the last frame.
+    pub problems: Vec<Problem>,
+}
+
+/// A value on its way along a weak route.
+#[derive(Debug)]
+struct Carried {
+    route: RouteId,
+    value: Value,
+    written: Revision,
+}
+
+/// What is kept from frame to frame.
+#[derive(Debug, Default)]
+pub(crate) struct FrameState {
+    pub(crate) always: BTreeSet<u32>,
+    pub(crate) dependencies: Vec<(NodeId, NodeId)>,
+    /// Nodes that are evaluated only when asked for, and were.
+    asked: HashSet<u32>,
+    carried: Vec<Carried>,
+    time_s: f64,
+    report: FrameReport,
+}
+
+impl FrameState {
+    pub(crate) fn forget(&mut self, slot: u32) {
+        self.always.remove(&slot);
+        self.asked.remove(&slot);
+    }
+}
+
+impl Graph {
+    /// Evaluates one frame: every node that was written, or that asked for it, has one turn, after all nodes from which strong routes lead to it.
+    ///
+    /// A turn tells the node's observers what was written, evaluates the node, tells what that wrote, and copies along routes what was written.
+    pub fn evaluate(&mut self, time_s: f64, host: &mut dyn Host) -> FrameReport {
+        if self.schedule.running {
+            let message = "the graph cannot be evaluated while it is being evaluated".to_string();
+            return FrameReport {
+                problems: vec![Problem { node: NodeId::default(), field: None, message }],
+                ..FrameReport::default()
+            };
+        }
+        self.frame.time_s = time_s;
+        let idle = self.schedule.is_idle() && self.frame.always.is_empty() && self.frame.carried.is_empty();
+        if !idle {
+            self.run_frame(host);
+        }
+        self.frame.dependencies.clear();
+        std::mem::take(&mut self.frame.report)
+    }
+
+    fn run_frame(&mut self, host: &mut dyn Host) {
+        for carried in std::mem::take(&mut self.frame.carried) {
+            self.deliver(carried.route, &carried.value, carried.written);
+        }
+        for slot in &self.frame.always {
+            self.schedule.mark(*slot);
+        }
+        self.refresh_order();
+        self.schedule.start();
+        while let Some(slot) = self.schedule.next() {
+            self.turn(slot, host);
+        }
+        self.schedule.running = false;
+        self.frame.asked.clear();
+    }
+
+    /// The time of the frame that is or was last evaluated, in seconds.
+    pub fn time(&self) -> f64 {
+        self.frame.time_s
+    }
+
+    /// Adds to the report of this frame, or of the next if none is being evaluated.
+    pub fn report(&mut self, node: NodeId, field: Option<FieldId>, message: impl Into<String>) {
+        self.frame.report.problems.push(Problem { node, field, message: message.into() });
+    }
+
+    /// How often the node was evaluated; 0 for a deleted node.
+    pub fn evaluation_count(&self, id: NodeId) -> u32 {
+        if self.contains(id) { self.schedule.turns[slot_of(id) as usize].count } else { 0 }
+    }
+
+    /// True if the field was written since its node was last evaluated; for hosts that evaluate nodes.
+    pub fn changed(&self, field: FieldId) -> bool {
+        let revision = self.field_revision(field);
+        revision > 0
+            && revision > self.schedule.turns[slot_of(field.node) as usize].evaluated
+            && self.silenced.get(&field) != Some(&revision)
+    }
+
+    /// Changes when a node is evaluated; its type says when at first.
+    pub fn set_mode(&mut self, id: NodeId, mode: Mode) -> Result<(), Error> {
+        self.node(id)?;
+        let slot = slot_of(id);
+        self.nodes[id].mode = mode;
+        self.frame.always.remove(&slot);
+        if mode == Mode::Always {
+            self.frame.always.insert(slot);
+        }
+        let flags = self.nodes[id].base_flags();
+        let at = &mut self.schedule.flags[slot as usize];
+        *at = *at & !EVALUATES | flags;
+        if mode == Mode::OnChange && self.changes.node(slot) > self.schedule.turns[slot as usize].evaluated {
+            self.schedule.mark(slot);
+        }
+        Ok(())
+    }
+
+    /// Has a node evaluated in the next frame, or in this one if it has not had its turn, changed or not.
+    pub fn wake(&mut self, id: NodeId) -> Result<(), Error> {
+        self.node(id)?;
+        self.schedule.mark(slot_of(id));
+        Ok(())
+    }
+
+    /// Evaluates a node of [`Mode::Pull`] now, if anything was written since its last evaluation, and before it those nodes of the same mode from
+    /// which strong routes lead to it.
+    pub fn pull(&mut self, id: NodeId, host: &mut dyn Host) -> Result<(), Error> {
+        self.node(id)?;
+        if self.schedule.flags[slot_of(id) as usize] & IN_TURN != 0 {
+            return Err(Error::Evaluating { what: "pulling a node out of its own evaluation" });
+        }
+        for source in self.pulled_with(id) {
+            let slot = slot_of(source);
+            let Some(turn) = self.contains(source).then(|| self.schedule.turns[slot as usize]) else { continue };
+            if turn.count == 0 || self.changes.node(slot) > turn.evaluated {
+                self.frame.asked.insert(slot);
+                self.turn(slot, host);
+                self.frame.asked.remove(&slot);
+            }
+        }
+        Ok(())
+    }
+
+    /// Asks for the turn of a node of [`Mode::Pull`], and of those that it needs.
+    pub(crate) fn ask(&mut self, id: NodeId) {
+        for source in self.pulled_with(id) {
+            let slot = slot_of(source);
+            self.frame.asked.insert(slot);
+            if !self.schedule.waits(slot) {
+                self.schedule.ranked(slot);
+                self.schedule.enqueue(slot);
+            }
+        }
+    }
+
+    /// The node and its sources, all of [`Mode::Pull`], sources first; empty if the node is of another mode.
+    fn pulled_with(&self, id: NodeId) -> Vec<NodeId> {
+        let pulled = |node: NodeId| self.nodes[node].mode == Mode::Pull;
+        let mut seen = HashSet::new();
+        let mut order = Vec::new();
+        let mut open = vec![(id, false)];
+        while let Some((node, sources_done)) = open.pop() {
+            if sources_done {
+                order.push(node);
+            } else if pulled(node) && seen.insert(node) {
+                open.push((node, true));
+                let incoming = self.nodes[node].incoming.iter().map(|route| &self.routes.all[*route]);
+                open.extend(incoming.filter(|route| route.strength == Strength::Strong).map(|route| (route.from.node, false)));
+            }
+        }
+        order
+    }
+
+    #[inline]
+    fn turn(&mut self, slot: u32, host: &mut dyn Host) {
+        let flags = self.schedule.flags[slot as usize];
+        let asked = !self.frame.asked.is_empty() && self.frame.asked.contains(&slot);
+        if (flags & !(ROUTED | SILENCED) != 0 || asked) && !self.live_turn(slot, asked, host) {
+            return;
+        }
+        if self.schedule.flags[slot as usize] & ROUTED != 0 {
+            self.copy_out(slot);
+        }
+    }
+
+    /// The part of a turn in which others have a say; false if the node was deleted on the way.
+    fn live_turn(&mut self, slot: u32, asked: bool, host: &mut dyn Host) -> bool {
+        let id = self.ids[slot as usize];
+        let at = slot as usize;
+        self.schedule.flags[at] |= IN_TURN;
+        if self.schedule.flags[at] & OBSERVED != 0 && !self.tell_observers(id, host) {
+            return false;
+        }
+        let evaluates = self.schedule.flags[at] & EVALUATES != 0 || asked;
+        if evaluates && !self.evaluate_node(id, host) {
+            return false;
+        }
+        self.schedule.flags[at] &= !IN_TURN;
+        self.schedule.flags[at] & OBSERVED == 0 || self.tell_observers(id, host)
+    }
+
+    /// False if the node was deleted on the way.
+    fn tell_observers(&mut self, id: NodeId, host: &mut dyn Host) -> bool {
+        for due in self.observers_due(id) {
+            let Some(observer) = self.observers.all.get(due).copied() else { continue };
+            self.observers.all[due].seen = self.field_revision(observer.field);
+            host.field_changed(self, observer.field, observer.token);
+            if !self.contains(id) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// False if the node was deleted on the way.
+    fn evaluate_node(&mut self, id: NodeId, host: &mut dyn Host) -> bool {
+        let slot = slot_of(id);
+        let node = &self.nodes[id];
+        self.frame.report.evaluated += 1;
+        let turn = &mut self.schedule.turns[slot as usize];
+        turn.count = turn.count.wrapping_add(1);
+        match &node.node_type.evaluator {
+            Evaluator::None => {}
+            Evaluator::Native(evaluate) => {
+                let mut evaluation = Evaluation {
+                    id,
+                    slot,
+                    node,
+                    columns: &mut self.columns,
+                    changes: &mut self.changes,
+                    silenced: &self.silenced,
+                    problems: &mut self.frame.report.problems,
+                    time_s: self.frame.time_s,
+                    evaluated: turn.evaluated,
+                    again: false,
+                };
+                evaluate(&mut evaluation);
+                if evaluation.again {
+                    self.schedule.again(slot);
+                }
+            }
+            Evaluator::Host => {
+                host.evaluate(self, id);
+                if !self.contains(id) {
+                    return false;
+                }
+            }
+        }
+        self.schedule.turns[slot as usize].evaluated = self.changes.last();
+        true
+    }
+
+    /// Copies along the node's routes what was written since it last did.
+    fn copy_out(&mut self, slot: u32) {
+        let program = self.programs.take(slot).unwrap_or_else(|| self.compile(self.ids[slot as usize]));
+        let before = std::mem::replace(&mut self.schedule.turns[slot as usize].propagated, self.changes.last());
+        let silenced = self.schedule.flags[slot as usize] & SILENCED != 0;
+        for group in &program {
+            let written = self.columns.revisions(group.field_type)[group.source as usize];
+            if written > before && !(silenced && self.is_silenced(slot, group.index, written)) {
+                self.run_group(group, written);
+            }
+        }
+        self.programs.put(slot, program);
+    }
+
+    fn is_silenced(&self, slot: u32, index: u16, written: Revision) -> bool {
+        self.silenced.get(&FieldId { node: self.ids[slot as usize], index }) == Some(&written)
+    }
+
+    #[inline]
+    fn run_group(&mut self, group: &Group, written: Revision) {
+        if !group.direct.is_empty() {
+            let (columns, changes, schedule) = (&mut self.columns, &mut self.changes, &mut self.schedule);
+            self.frame.report.copied += copy_group(columns, changes, schedule, group, written);
+        }
+        if group.slow.is_empty() && group.weak.is_empty() {
+            return;
+        }
+        let value = self.columns.value(group.field_type, group.source);
+        for route in &group.slow {
+            self.deliver(*route, &value, written);
+        }
+        for route in &group.weak {
+            self.frame.carried.push(Carried { route: *route, value: value.clone(), written });
+        }
+    }
+
+    /// Delivers a value along a route, unless the target was written later than the source, or a route with a later write was here before.
+    fn deliver(&mut self, route: RouteId, value: &Value, written: Revision) {
+        let Some(route) = self.routes.all.get(route).copied() else { return };
+        let Ok((target, slot)) = self.place(route.to) else { return };
+        let (field_type, range, compare) = (target.field_type, target.range, target.on_set == SetRule::Compare);
+        let fan_in = self.is_fan_in(route.to);
+        let last = self.columns.revisions(field_type)[slot as usize];
+        let arrival = self.routes.arrivals.get(&route.to).copied().filter(|arrival| fan_in && arrival.delivered == last);
+        let late = match arrival {
+            Some(arrival) => (written, route.ordinal) <= arrival.won,
+            None => written <= last,
+        };
+        if late {
+            return;
+        }
+        let Some(value) = value.convert(field_type) else { return };
+        let value = range.map_or(value.clone(), |(smallest, largest)| value.clamped(smallest, largest));
+        let revision = self.changes.last() + 1;
+        let copied = self.columns.write(slot, value, compare, revision);
+        if copied {
+            self.changes.next();
+            self.changes.wrote(slot_of(route.to.node), revision);
+            self.schedule.mark(slot_of(route.to.node));
+            self.frame.report.copied += 1;
+        }
+        if fan_in {
+            let delivered = if copied { revision } else { last };
+            self.routes.arrivals.insert(route.to, Arrival { won: (written, route.ordinal), delivered });
+        }
+    }
+
+    /// What a new route does: the target takes the source's value, if that was ever written.
+    pub(crate) fn deliver_at_once(&mut self, route: RouteId) {
+        let Route { from, to, .. } = self.routes.all[route];
+        let created = self.nodes[from.node].created;
+        let Ok((source, slot)) = self.place(from) else { return };
+        if self.columns.revisions(source.field_type)[slot as usize] <= created {
+            return;
+        }
+        let value = self.columns.value(source.field_type, slot);
+        let Ok((target, slot)) = self.place(to) else { return };
+        let range = target.range;
+        let Some(value) = value.convert(target.field_type) else { return };
+        let value = range.map_or(value.clone(), |(smallest, largest)| value.clamped(smallest, largest));
+        let revision = self.changes.last() + 1;
+        if self.columns.write(slot, value, true, revision) {
+            self.changes.next();
+            self.changes.wrote(slot_of(to.node), revision);
+            self.schedule.mark(slot_of(to.node));
+        }
+    }
+}

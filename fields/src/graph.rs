@@ -1,0 +1,408 @@
+//! The graph: nodes, their names, and their dynamic fields.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+
+use slotmap::{Key, SlotMap};
+
+use crate::changes::ChangeLog;
+use crate::column::{Columns, FREE};
+use crate::frame::FrameState;
+use crate::naming::{canonical, hint};
+use crate::observe::Observers;
+use crate::program::Programs;
+use crate::route::Routes;
+use crate::schedule::{EVALUATES, Schedule};
+use crate::{Changes, Error, Evaluator, Field, Kind, Mode, NodeType, Revision, TypeRegistry, Value};
+
+slotmap::new_key_type! {
+    /// A node. Ids of deleted nodes are never valid again.
+    pub struct NodeId;
+}
+
+/// A field of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct FieldId {
+    /// The node.
+    pub node: NodeId,
+    /// The place in the node's list of fields: declared ones first, then dynamic ones. The place of a removed field may be used again.
+    pub index: u16,
+}
+
+/// The node's place in every array that is kept by node.
+#[inline]
+pub(crate) fn slot_of(id: NodeId) -> u32 {
+    id.data().as_ffi() as u32
+}
+
+/// One node.
+#[derive(Debug)]
+pub(crate) struct Node {
+    pub(crate) node_type: Arc<NodeType>,
+    pub(crate) name: Option<Arc<str>>,
+    /// By field index: the slot in the column of the field's type, or `FREE` where a dynamic field was removed.
+    pub(crate) slots: Vec<u32>,
+    /// Fields beyond the declared ones.
+    pub(crate) dynamic: Vec<Option<Field>>,
+    /// Routes to its fields and from them; each route knows its place here.
+    pub(crate) incoming: Vec<crate::RouteId>,
+    pub(crate) outgoing: Vec<crate::RouteId>,
+    pub(crate) created: Revision,
+    pub(crate) mode: Mode,
+}
+
+impl Node {
+    #[inline]
+    pub(crate) fn field(&self, index: u16) -> Option<&Field> {
+        let declared = &self.node_type.fields;
+        match declared.get(index as usize) {
+            Some(field) => Some(field),
+            None => self.dynamic.get(index as usize - declared.len())?.as_ref(),
+        }
+    }
+
+    /// All fields with their indices.
+    pub(crate) fn fields(&self) -> impl Iterator<Item = (u16, &Field)> {
+        let declared = self.node_type.fields.iter().map(Some);
+        let all = declared.chain(self.dynamic.iter().map(Option::as_ref));
+        all.enumerate().filter_map(|(index, field)| Some((index as u16, field?)))
+    }
+
+    fn index_of(&self, name: &str) -> Option<u16> {
+        if let Some(index) = self.node_type.field_index(name) {
+            return Some(index);
+        }
+        if self.dynamic.is_empty() {
+            return None;
+        }
+        let name = canonical(name);
+        let place = self.dynamic.iter().position(|field| field.as_ref().is_some_and(|field| field.is_named(&name)))?;
+        Some((self.node_type.fields.len() + place) as u16)
+    }
+
+    /// The flags that it has by its type.
+    pub(crate) fn base_flags(&self) -> u8 {
+        match (&self.node_type.evaluator, self.mode) {
+            (Evaluator::None, _) | (_, Mode::Pull) => 0,
+            _ => EVALUATES,
+        }
+    }
+}
+
+/// All nodes, their values in typed columns, and the routes between them.
+pub struct Graph {
+    types: TypeRegistry,
+    pub(crate) nodes: SlotMap<NodeId, Node>,
+    /// By node slot; null where no node is.
+    pub(crate) ids: Vec<NodeId>,
+    pub(crate) columns: Columns,
+    pub(crate) changes: ChangeLog,
+    pub(crate) schedule: Schedule,
+    pub(crate) routes: Routes,
+    pub(crate) programs: Programs,
+    pub(crate) observers: Observers,
+    pub(crate) frame: FrameState,
+    /// The revision of fields that were last written silently.
+    pub(crate) silenced: HashMap<FieldId, Revision>,
+    names: HashMap<Arc<str>, NodeId>,
+    /// What a deleted node's type is said to be.
+    deleted_type: Arc<NodeType>,
+}
+
+impl fmt::Debug for Graph {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Graph({} nodes, {} routes, revision {})", self.nodes.len(), self.routes.all.len(), self.changes.last())
+    }
+}
+
+impl Graph {
+    /// A graph without nodes. Takes a registry or a list of types.
+    pub fn new(types: impl Into<TypeRegistry>) -> Self {
+        Self {
+            types: types.into(),
+            nodes: SlotMap::with_key(),
+            ids: Vec::new(),
+            columns: Columns::default(),
+            changes: ChangeLog::default(),
+            schedule: Schedule::default(),
+            routes: Routes::default(),
+            programs: Programs::default(),
+            observers: Observers::default(),
+            frame: FrameState::default(),
+            silenced: HashMap::new(),
+            names: HashMap::new(),
+            deleted_type: Arc::new(NodeType::new("(deleted)", "A node that does not exist any more.")),
+        }
+    }
+
+    /// The types that can be created; more can be registered at any time.
+    pub fn types(&self) -> &TypeRegistry {
+        &self.types
+    }
+
+    /// Creates a node of a type by the type's name or alias.
+    pub fn create(&mut self, type_name: &str) -> Result<NodeId, Error> {
+        let node_type = self.types.get(type_name)?;
+        Ok(self.create_of(node_type))
+    }
+
+    /// Creates a node of a type that the registry or another node gave.
+    pub fn create_of(&mut self, node_type: Arc<NodeType>) -> NodeId {
+        let created = self.changes.next();
+        let (mode, fields) = (node_type.mode, node_type.fields.len());
+        let id = self.nodes.insert(Node {
+            node_type,
+            name: None,
+            slots: Vec::with_capacity(fields),
+            dynamic: Vec::new(),
+            incoming: Vec::new(),
+            outgoing: Vec::new(),
+            created,
+            mode,
+        });
+        let slot = slot_of(id);
+        if self.ids.len() <= slot as usize {
+            self.ids.resize(slot as usize + 1, NodeId::default());
+            self.changes.grow(self.ids.len());
+            self.schedule.grow(self.ids.len());
+            self.programs.grow(self.ids.len());
+        }
+        self.ids[slot as usize] = id;
+        let node = &mut self.nodes[id];
+        for (index, field) in node.node_type.fields.iter().enumerate() {
+            node.slots.push(self.columns.insert(field.default.clone(), (slot, index as u16), created));
+        }
+        let flags = node.base_flags();
+        self.schedule.created(slot, flags, created);
+        self.changes.wrote(slot, created);
+        self.schedule.mark(slot);
+        if mode == Mode::Always {
+            self.frame.always.insert(slot);
+        }
+        id
+    }
+
+    /// Deletes a node with its routes, observers and name. References to it in fields stay and are dead ([`Graph::contains`]).
+    pub fn delete(&mut self, id: NodeId) -> Result<(), Error> {
+        let node = self.nodes.get(id).ok_or(Error::DeadNode)?;
+        for route in node.incoming.iter().chain(&node.outgoing).copied().collect::<Vec<_>>() {
+            self.disconnect(route);
+        }
+        let Some(node) = self.nodes.remove(id) else { return Err(Error::DeadNode) };
+        let slot = slot_of(id);
+        for (index, field) in node.fields() {
+            self.columns.remove(field.field_type, node.slots[index as usize]);
+            self.silenced.remove(&FieldId { node: id, index });
+        }
+        if let Some(name) = &node.name {
+            self.names.remove(name);
+        }
+        self.observers.forget_node(slot);
+        self.programs.forget(slot);
+        self.schedule.deleted(slot);
+        self.frame.forget(slot);
+        self.ids[slot as usize] = NodeId::default();
+        let revision = self.changes.next();
+        self.changes.deleted(id, revision);
+        Ok(())
+    }
+
+    /// True if the node exists.
+    pub fn contains(&self, id: NodeId) -> bool {
+        self.nodes.contains_key(id)
+    }
+
+    /// All nodes, in no particular but always the same order.
+    pub fn nodes(&self) -> impl Iterator<Item = NodeId> {
+        self.nodes.keys()
+    }
+
+    /// How many nodes there are.
+    pub fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// The node's type; for a deleted node a type called `(deleted)` without fields.
+    pub fn type_of(&self, id: NodeId) -> &Arc<NodeType> {
+        self.nodes.get(id).map_or(&self.deleted_type, |node| &node.node_type)
+    }
+
+    pub(crate) fn node(&self, id: NodeId) -> Result<&Node, Error> {
+        self.nodes.get(id).ok_or(Error::DeadNode)
+    }
+
+    /// Names a node; the empty name takes its name away. Names are unique in a graph.
+    pub fn set_name(&mut self, id: NodeId, name: &str) -> Result<(), Error> {
+        self.node(id)?;
+        if let Some(other) = self.names.get(name).copied().filter(|other| *other != id) {
+            let (node, other) = (self.describe(id), self.describe(other));
+            return Err(Error::DuplicateName { node, name: name.into(), other });
+        }
+        let node = &mut self.nodes[id];
+        if let Some(old) = node.name.take() {
+            self.names.remove(&old);
+        }
+        if !name.is_empty() {
+            let name: Arc<str> = name.into();
+            node.name = Some(name.clone());
+            self.names.insert(name, id);
+        }
+        let revision = self.changes.next();
+        self.changes.wrote(slot_of(id), revision);
+        Ok(())
+    }
+
+    /// The node's name, if it has one.
+    pub fn name(&self, id: NodeId) -> Option<&str> {
+        self.nodes.get(id)?.name.as_deref()
+    }
+
+    /// The node of a name.
+    pub fn find(&self, name: &str) -> Option<NodeId> {
+        self.names.get(name).copied()
+    }
+
+    /// All names, in no particular order; for messages.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.names.keys().map(|name| &**name)
+    }
+
+    /// The node at the end of a path of names, such as `/world/house/door`: each is among the `children` of the one before.
+    pub fn find_path(&self, path: &str) -> Option<NodeId> {
+        let mut names = path.split('/').filter(|name| !name.is_empty());
+        let mut at = self.find(names.next()?)?;
+        for name in names {
+            let next = self.find(name)?;
+            let children = self.value(self.field(at, "children").ok()?).ok()?;
+            let Value::Nodes(children) = children else { return None };
+            if !children.contains(&Some(next)) {
+                return None;
+            }
+            at = next;
+        }
+        Some(at)
+    }
+
+    /// The field of a name or alias, in any spelling; the error names the nearest one.
+    pub fn field(&self, id: NodeId, name: &str) -> Result<FieldId, Error> {
+        let node = self.node(id)?;
+        match node.index_of(name) {
+            Some(index) => Ok(FieldId { node: id, index }),
+            None => {
+                let names =
+                    node.fields().flat_map(|(_, field)| std::iter::once(&*field.name).chain(field.aliases.iter().map(|a| &**a)));
+                Err(Error::UnknownField { node: self.describe(id), name: name.into(), hint: hint(name, names) })
+            }
+        }
+    }
+
+    /// The declaration of a field.
+    pub fn declaration(&self, field: FieldId) -> Result<&Field, Error> {
+        self.node(field.node)?.field(field.index).ok_or_else(|| self.dead_field(field))
+    }
+
+    /// The declarations of a node's fields: declared ones, then dynamic ones.
+    pub fn fields_of(&self, id: NodeId) -> impl Iterator<Item = &Field> {
+        self.nodes.get(id).into_iter().flat_map(Node::fields).map(|(_, field)| field)
+    }
+
+    /// The ids of a node's fields with their declarations.
+    pub fn field_ids(&self, id: NodeId) -> impl Iterator<Item = (FieldId, &Field)> {
+        self.nodes.get(id).into_iter().flat_map(Node::fields).map(move |(index, field)| (FieldId { node: id, index }, field))
+    }
+
+    /// Gives one node a field that its type does not have.
+    pub fn add_field(&mut self, id: NodeId, field: Field) -> Result<FieldId, Error> {
+        let node = self.node(id)?;
+        if let Some(fault) = field.fault() {
+            return Err(Error::BadField { node: self.describe(id), fault });
+        }
+        for name in std::iter::once(&field.name).chain(&field.aliases) {
+            if node.index_of(name).is_some() {
+                return Err(Error::DuplicateField { node: self.describe(id), name: name.to_string() });
+            }
+        }
+        let declared = node.node_type.fields.len();
+        let place = node.dynamic.iter().position(Option::is_none).unwrap_or(node.dynamic.len());
+        let Some(index) = u16::try_from(declared + place).ok().filter(|index| *index < u16::MAX) else {
+            return Err(Error::BadField { node: self.describe(id), fault: format!("it has {} fields already", u16::MAX) });
+        };
+        let revision = self.changes.next();
+        let slot = self.columns.insert(field.default.clone(), (slot_of(id), index), revision);
+        let node = &mut self.nodes[id];
+        if place == node.dynamic.len() {
+            node.dynamic.push(None);
+            node.slots.push(FREE);
+        }
+        node.dynamic[place] = Some(field);
+        node.slots[index as usize] = slot;
+        self.changes.wrote(slot_of(id), revision);
+        self.schedule.mark(slot_of(id));
+        Ok(FieldId { node: id, index })
+    }
+
+    /// Removes a field that was added to one node, with its routes and observers.
+    pub fn remove_field(&mut self, field: FieldId) -> Result<(), Error> {
+        let declared = self.declaration(field)?;
+        let field_type = declared.field_type;
+        let first_dynamic = self.nodes[field.node].node_type.fields.len();
+        if (field.index as usize) < first_dynamic {
+            return Err(Error::NotDynamic { field: self.describe_field(field) });
+        }
+        for route in self.routes_from(field).chain(self.routes_to(field)).collect::<Vec<_>>() {
+            self.disconnect(route);
+        }
+        self.forget_observers_of(field);
+        self.silenced.remove(&field);
+        let node = &mut self.nodes[field.node];
+        node.dynamic[field.index as usize - first_dynamic] = None;
+        let slot = std::mem::replace(&mut node.slots[field.index as usize], FREE);
+        self.columns.remove(field_type, slot);
+        let revision = self.changes.next();
+        self.changes.wrote(slot_of(field.node), revision);
+        Ok(())
+    }
+
+    /// The revision of the last write. Ask [`Graph::changes_since`] with it later.
+    pub fn revision(&self) -> Revision {
+        self.changes.boundary()
+    }
+
+    /// The revision of the last write of any of the node's fields, of its name, or of its creation; 0 for a deleted node.
+    pub fn node_revision(&self, id: NodeId) -> Revision {
+        if self.contains(id) { self.changes.node(slot_of(id)) } else { 0 }
+    }
+
+    /// Which nodes were written, created, or deleted after a revision.
+    pub fn changes_since(&self, revision: Revision) -> Changes {
+        self.changes.since(revision, &self.ids)
+    }
+
+    /// Name and type of a node, for messages.
+    pub fn describe(&self, id: NodeId) -> String {
+        match self.nodes.get(id) {
+            None => "a deleted node".into(),
+            Some(Node { name: Some(name), node_type, .. }) => format!("`{name}` ({})", node_type.name),
+            Some(node) => format!("an unnamed {}", node.node_type.name),
+        }
+    }
+
+    /// Node and field, for messages: `` `door`.angle ``.
+    pub fn describe_field(&self, field: FieldId) -> String {
+        let name = self.nodes.get(field.node).and_then(|node| node.field(field.index)).map_or("(removed)", |field| &field.name);
+        match self.name(field.node) {
+            Some(node) => format!("`{node}.{name}`"),
+            None => format!("`{name}` of {}", self.describe(field.node)),
+        }
+    }
+
+    pub(crate) fn dead_field(&self, field: FieldId) -> Error {
+        Error::DeadField { node: self.describe(field.node), index: field.index }
+    }
+
+    /// True if the field holds node references.
+    pub fn holds_nodes(&self, field: FieldId) -> bool {
+        self.declaration(field).is_ok_and(|field| field.field_type.kind == Kind::Node)
+    }
+}

@@ -1,0 +1,201 @@
+//! Whose turn it is: flags, ranks and the set of nodes that wait for their turn in this frame or the next.
+
+use crate::bits::BitSet;
+use crate::changes::Revision;
+
+/// The node has an evaluate that changes trigger.
+pub(crate) const EVALUATES: u8 = 1;
+/// Routes leave the node.
+pub(crate) const ROUTED: u8 = 2;
+/// Somebody observes one of the node's fields.
+pub(crate) const OBSERVED: u8 = 4;
+/// The node waits for its turn.
+pub(crate) const DIRTY: u8 = 8;
+/// It is the node's turn: its own writes do not ask for another one.
+pub(crate) const IN_TURN: u8 = 16;
+/// Some fields were last written silently.
+pub(crate) const SILENCED: u8 = 32;
+/// Somebody has to hear of the node's changes.
+const INTEREST: u8 = EVALUATES | ROUTED | OBSERVED;
+
+/// The node has no place in the order.
+pub(crate) const NO_RANK: u32 = u32::MAX;
+
+/// What is known of a node's turns.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turn {
+    /// Writes up to this revision were copied along routes.
+    pub(crate) propagated: Revision,
+    /// Writes up to this revision were seen by evaluate.
+    pub(crate) evaluated: Revision,
+    /// The frame of the last turn.
+    pub(crate) frame: u64,
+    pub(crate) rank: u32,
+    /// How often the node was evaluated.
+    pub(crate) count: u32,
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct Schedule {
+    /// By node slot, beside each other because every write reads them.
+    pub(crate) flags: Vec<u8>,
+    /// By node slot.
+    pub(crate) turns: Vec<Turn>,
+    /// By rank: the node's slot, or `NO_RANK` where the node is gone. A topological order of the strong routes unless `stale`.
+    pub(crate) by_rank: Vec<u32>,
+    /// A route contradicts the ranks: make them anew before the next turn.
+    pub(crate) stale: bool,
+    /// Ranks of nodes that wait for their turn in this frame.
+    queue: BitSet,
+    /// Slots of nodes that wait for the next frame.
+    pending: Vec<u32>,
+    pub(crate) frame: u64,
+    pub(crate) running: bool,
+    holes: usize,
+}
+
+impl Schedule {
+    pub(crate) fn grow(&mut self, slots: usize) {
+        if self.flags.len() < slots {
+            self.flags.resize(slots, 0);
+            self.turns.resize(slots, Turn { propagated: 0, evaluated: 0, frame: 0, rank: NO_RANK, count: 0 });
+        }
+    }
+
+    /// Starts the life of a node.
+    pub(crate) fn created(&mut self, slot: u32, flags: u8, revision: Revision) {
+        self.flags[slot as usize] = flags;
+        self.turns[slot as usize] = Turn { propagated: revision, evaluated: revision, frame: 0, rank: NO_RANK, count: 0 };
+    }
+
+    /// Ends it.
+    pub(crate) fn deleted(&mut self, slot: u32) {
+        let rank = self.turns[slot as usize].rank;
+        if rank != NO_RANK {
+            self.queue.remove(rank as usize);
+            self.by_rank[rank as usize] = NO_RANK;
+            self.made_hole();
+        }
+        self.created(slot, 0, 0);
+        // Slots of nodes that came and went without a frame must not pile up.
+        if self.pending.len() > 2 * self.flags.len() + 64 {
+            self.pending.sort_unstable();
+            self.pending.dedup();
+            self.pending.retain(|slot| self.flags[*slot as usize] & DIRTY != 0);
+        }
+    }
+
+    /// Asks for a turn if anybody would hear of it: in this frame, or in the next if the node had its turn already.
+    #[inline]
+    pub(crate) fn mark(&mut self, slot: u32) {
+        let flags = self.flags[slot as usize];
+        if flags & INTEREST != 0 && flags & (DIRTY | IN_TURN) == 0 {
+            self.enqueue(slot);
+        }
+    }
+
+    /// Asks for a turn even if nobody would hear of it.
+    #[inline]
+    pub(crate) fn enqueue(&mut self, slot: u32) {
+        self.flags[slot as usize] |= DIRTY;
+        let turn = &self.turns[slot as usize];
+        if self.running && turn.frame != self.frame && turn.rank != NO_RANK {
+            self.queue.insert(turn.rank as usize);
+        } else {
+            self.pending.push(slot);
+        }
+    }
+
+    /// Asks for a turn in the next frame.
+    pub(crate) fn again(&mut self, slot: u32) {
+        self.flags[slot as usize] |= DIRTY;
+        self.pending.push(slot);
+    }
+
+    /// True if no node waits.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.pending.is_empty()
+    }
+
+    /// Starts a frame: all that wait get a place in the queue.
+    pub(crate) fn start(&mut self) {
+        self.frame += 1;
+        self.running = true;
+        let mut pending = std::mem::take(&mut self.pending);
+        for slot in pending.drain(..) {
+            if self.flags[slot as usize] & DIRTY != 0 {
+                let rank = self.ranked(slot);
+                self.queue.insert(rank as usize);
+            }
+        }
+        // Marks during the drain are impossible, so the allocation can be kept.
+        self.pending = pending;
+    }
+
+    /// The node that is next, by slot. It is not dirty any more.
+    #[inline]
+    pub(crate) fn next(&mut self) -> Option<u32> {
+        let slot = self.by_rank[self.queue.pop_lowest()?];
+        self.flags[slot as usize] &= !DIRTY;
+        self.turns[slot as usize].frame = self.frame;
+        Some(slot)
+    }
+
+    /// The node's rank; at the end of the order if it had none.
+    pub(crate) fn ranked(&mut self, slot: u32) -> u32 {
+        let turn = &mut self.turns[slot as usize];
+        if turn.rank == NO_RANK {
+            turn.rank = self.by_rank.len() as u32;
+            self.by_rank.push(slot);
+            self.queue.reserve(self.by_rank.len());
+        }
+        self.turns[slot as usize].rank
+    }
+
+    /// Moves a node behind all others.
+    pub(crate) fn move_to_end(&mut self, slot: u32) {
+        let old = self.turns[slot as usize].rank;
+        let waits = self.waits(slot);
+        if old != NO_RANK {
+            self.queue.remove(old as usize);
+            self.by_rank[old as usize] = NO_RANK;
+            self.turns[slot as usize].rank = NO_RANK;
+            self.made_hole();
+        }
+        let rank = self.ranked(slot);
+        if waits {
+            self.queue.insert(rank as usize);
+        }
+    }
+
+    /// Too many holes are a reason to number anew.
+    fn made_hole(&mut self) {
+        self.holes += 1;
+        self.stale |= self.holes > 64 && self.holes > self.by_rank.len() / 2;
+    }
+
+    /// Replaces the order; every node that waits in this frame must have a place in it.
+    pub(crate) fn set_order(&mut self, order: Vec<u32>) {
+        let waiting: Vec<u32> = std::iter::from_fn(|| self.queue.pop_lowest()).map(|rank| self.by_rank[rank]).collect();
+        for slot in std::mem::replace(&mut self.by_rank, order) {
+            if slot != NO_RANK {
+                self.turns[slot as usize].rank = NO_RANK;
+            }
+        }
+        for (rank, slot) in self.by_rank.iter().enumerate() {
+            self.turns[*slot as usize].rank = rank as u32;
+        }
+        self.queue.reserve(self.by_rank.len());
+        for slot in waiting {
+            let rank = self.ranked(slot);
+            self.queue.insert(rank as usize);
+        }
+        (self.stale, self.holes) = (false, 0);
+    }
+
+    /// True if the node will have a turn in this frame.
+    pub(crate) fn waits(&self, slot: u32) -> bool {
+        let rank = self.turns[slot as usize].rank;
+        rank != NO_RANK && self.queue.contains(rank as usize)
+    }
+}
