@@ -27,6 +27,9 @@ pub enum Error {
         /// All names, sorted.
         known: Vec<String>,
     },
+    /// A field could not be read or written.
+    #[error(transparent)]
+    Fields(#[from] umbriel_fields::Error),
     /// A file cannot be watched.
     #[error("cannot watch {}: {reason}", path.display())]
     Watch {
@@ -114,6 +117,9 @@ pub enum RigError {
         /// What is there instead.
         found: String,
     },
+    /// A viewpoint that nothing in the world has as a child.
+    #[error("the viewpoint is not in the world: add it to the children of the world or of a group")]
+    NotInWorld,
     /// Red and cyan are two views.
     #[error("anaglyph shows one screen, not {screens} screens: use one display for each")]
     Anaglyph {

@@ -13,3 +13,5 @@ mod watch;
 
 pub use error::Error;
 pub use watch::FileWatch;
+/// x
+pub type WindowSizes = std::collections::BTreeMap<String, [u32; 2]>;

@@ -1,6 +1,10 @@
 //! Mouse and keys move the world while the views stand still in the room.
 //!
-//! [`Navigator`] is plain state and a pure function.
+//! [`Navigator`] is plain state and a pure function; [`NavigationNode`] brings it from and to the `Navigation` node.
+
+mod node;
+
+pub use node::NavigationNode;
 
 use glam::{Mat4, Quat, Vec2, Vec3};
 use umbriel_scene::View;

@@ -10,7 +10,7 @@ use umbriel_scene::{Aabb, Frustum};
 pub struct Camera {
     /// Where it stands; rigid.
     pub room_from_camera: Mat4,
-    /// Angle over the shorter side of the window (X3D `fieldOfView`).
+    /// Whole vertical angle.
     pub fov_rad: f32,
     /// Distance of the near plane, metres.
     pub near: f32,
@@ -20,17 +20,9 @@ pub struct Camera {
 const WINDOW_IN_EYE_DISTANCES: f32 = 30.0;
 
 impl Camera {
-    /// The same camera without the scale and shear that its pose may carry.
-    pub fn rigid(self) -> Camera {
-        let (_, rotation, translation) = self.room_from_camera.to_scale_rotation_translation();
-        Camera { room_from_camera: Mat4::from_rotation_translation(rotation.normalize(), translation), ..self }
-    }
-
     /// What it sees through a window of `size` pixels with both eyes together.
     pub fn frustum(&self, size: [u32; 2]) -> Frustum {
-        let aspect = size[0].max(1) as f32 / size[1].max(1) as f32;
-        let fovy_rad = if aspect >= 1.0 { self.fov_rad } else { 2.0 * ((self.fov_rad * 0.5).tan() / aspect).atan() };
-        Frustum::symmetric(fovy_rad, aspect, self.near)
+        Frustum::symmetric(self.fov_rad, size[0].max(1) as f32 / size[1].max(1) as f32, self.near)
     }
 
     /// `view_from_room` and frustum of one eye. The eyes are `eye_distance` metres apart and look through one window, thirty
@@ -75,8 +67,8 @@ pub fn fit_camera(bounds: &Aabb, fov_rad: f32, aspect: f32) -> Camera {
     // Flat things are seen from higher up than tall ones.
     let elevation_rad = if footprint > 0.0 { (0.6 - 0.35 * size.y / footprint).clamp(0.2, 0.6) } else { 0.2 };
     let rotation = Quat::from_rotation_y(0.55) * Quat::from_rotation_x(-elevation_rad);
-    let short = (fov_rad * 0.5).tan();
-    let (tan_x, tan_y) = if aspect >= 1.0 { (short * aspect, short) } else { (short, short / aspect) };
+    let tan_y = (fov_rad * 0.5).tan();
+    let tan_x = tan_y * aspect;
     let centre = bounds.centre();
     let room = bounds.corners().map(|c| rotation.inverse() * (c - centre));
     // Each corner tells how far away the camera must be for it to be inside the frustum; a tenth is left as a margin.
@@ -129,16 +121,6 @@ mod tests {
     }
 
     #[test]
-    fn portrait_windows_keep_the_field_of_view_across() {
-        let camera = Camera { room_from_camera: Mat4::IDENTITY, fov_rad: 1.0, near: 0.1 };
-        for (size, across, up) in [([200, 100], 2.0, 1.0), ([100, 100], 1.0, 1.0), ([100, 200], 1.0, 2.0)] {
-            let f = camera.frustum(size);
-            let unit = 0.1 * 0.5f32.tan();
-            assert!((f.right - across * unit).abs() < 1e-6 && (f.top - up * unit).abs() < 1e-6, "{size:?}");
-        }
-    }
-
-    #[test]
     fn stereo_eyes_meet_in_the_window() {
         let camera = Camera { room_from_camera: Mat4::from_rotation_y(0.5), fov_rad: 1.0, near: 0.05 };
         let at = |eye: Eye, z: f32| {
@@ -148,13 +130,5 @@ mod tests {
         assert!((at(Eye::Left, -1.8).x - at(Eye::Right, -1.8).x).abs() < 1e-5);
         assert!(at(Eye::Left, -0.9).x > at(Eye::Right, -0.9).x + 1e-3);
         assert!(at(Eye::Left, -9.0).x < at(Eye::Right, -9.0).x - 1e-3);
-    }
-
-    #[test]
-    fn scale_is_left_out_of_a_pose() {
-        let pose = Mat4::from_scale_rotation_translation(Vec3::splat(5.0), Quat::from_rotation_x(0.3), Vec3::ONE);
-        let camera = Camera { room_from_camera: pose, fov_rad: 1.0, near: 0.1 }.rigid();
-        let want = Mat4::from_rotation_translation(Quat::from_rotation_x(0.3), Vec3::ONE);
-        assert!(camera.room_from_camera.abs_diff_eq(want, 1e-5));
     }
 }

@@ -40,6 +40,13 @@ pub struct Head {
     pub eye_distance: f32,
 }
 
+impl Default for Head {
+    /// A standing person at the room's origin.
+    fn default() -> Head {
+        Head { position: Vec3::new(0.0, 1.7, 0.0), orientation: Quat::IDENTITY, eye_distance: 0.064 }
+    }
+}
+
 impl Head {
     /// Place of an eye in the room.
     pub fn eye(&self, eye: Eye) -> Vec3 {

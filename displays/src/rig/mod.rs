@@ -3,8 +3,13 @@
 mod arrange;
 mod camera;
 mod channels;
+mod display;
 mod eyes;
+mod nodes;
 mod off_axis;
+mod pictures;
+#[cfg(test)]
+mod tests;
 
 pub use crate::error::RigError;
 pub use arrange::Arrangement;
@@ -12,3 +17,4 @@ pub use camera::{Camera, fit_camera};
 pub use channels::{Room, cylinder_screens, room_screens};
 pub use eyes::{Eye, Head};
 pub use off_axis::{ScreenCorners, off_axis};
+pub use pictures::{DESKTOP, Pictures, Rig, Wanted};

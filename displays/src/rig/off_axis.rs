@@ -174,7 +174,7 @@ mod tests {
     fn what_is_no_screen_is_told() {
         let ok = [[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [-1.0, 2.0, -1.0]];
         let eye = [0.0, 1.0, 0.0];
-        let rows: [([f32; 3], [[f32; 3]; 3], f32, &str); 9] = [
+        let rows = [
             (eye, [[0.0; 3]; 3], 0.1, "no area"),
             (eye, [ok[0], ok[1], ok[1]], 0.1, "no area"),
             (eye, [ok[0], ok[1], [-0.5, 2.0, -1.0]], 0.1, "right angle"),
@@ -186,7 +186,7 @@ mod tests {
             (eye, ok, f32::NAN, "near"),
         ];
         for (eye, screen, near, want) in rows {
-            let message = off_axis(eye.into(), &corners(screen), near).unwrap_err().to_string();
+            let message = off_axis(Vec3::from(eye), &corners(screen), near).unwrap_err().to_string();
             assert!(message.contains(want), "{screen:?}: {message}");
         }
     }
