@@ -1,0 +1,71 @@
+//! The words of the language: every function that worlds can call, with its documentation.
+
+mod handlers;
+mod lists;
+mod maths;
+mod nodes;
+mod paper;
+mod routes;
+mod shapes;
+mod types;
+mod vectors;
+
+use std::rc::Rc;
+
+use rhai::{Engine, FuncRegistration, RhaiNativeFunc, Variant};
+
+use crate::reference::FunctionDoc;
+use crate::stage::Stage;
+
+/// Collects functions into an engine, and their documentation beside it.
+pub(crate) struct Words<'a> {
+    pub(crate) engine: &'a mut Engine,
+    pub(crate) stage: Rc<Stage>,
+    pub(crate) docs: Vec<FunctionDoc>,
+    chapter: &'static str,
+}
+
+impl Words<'_> {
+    fn chapter(&mut self, chapter: &'static str) -> &mut Self {
+        self.chapter = chapter;
+        self
+    }
+
+    /// A function; the signature reads `name(parameter: type, ...) -> type`.
+    fn word<A: 'static, const N: usize, const X: bool, R: Variant + Clone, const F: bool>(
+        &mut self,
+        signature: &'static str,
+        doc: &'static str,
+        function: impl RhaiNativeFunc<A, N, X, R, F> + 'static,
+    ) -> &mut Self {
+        self.docs.push(FunctionDoc { chapter: self.chapter, signature, doc });
+        self.form(signature, function)
+    }
+
+    /// Another form of a function that is documented already; only the name of the signature matters. Constants may be
+    /// given too: a node that is held by a constant can change.
+    fn form<A: 'static, const N: usize, const X: bool, R: Variant + Clone, const F: bool>(
+        &mut self,
+        signature: &'static str,
+        function: impl RhaiNativeFunc<A, N, X, R, F> + 'static,
+    ) -> &mut Self {
+        let name = signature.split('(').next().unwrap_or(signature);
+        FuncRegistration::new(name).with_volatility(true).with_purity(true).register_into_engine(self.engine, function);
+        self
+    }
+}
+
+/// Teaches an engine every word.
+pub(crate) fn teach(engine: &mut Engine, stage: &Rc<Stage>) -> Vec<FunctionDoc> {
+    let mut words = Words { engine, stage: stage.clone(), docs: Vec::new(), chapter: "" };
+    nodes::teach(words.chapter("Nodes and fields"));
+    routes::teach(words.chapter("Routes"));
+    handlers::teach(words.chapter("Handlers"));
+    shapes::teach(words.chapter("Shapes and groups"));
+    types::teach(words.chapter("Node types of your own"));
+    vectors::teach(words.chapter("Vectors, turns, colours"));
+    maths::teach(words.chapter("Numbers"));
+    lists::teach(words.chapter("Lists"));
+    paper::teach(words.chapter("As in AVANGO's scheme"));
+    words.docs
+}

@@ -1,0 +1,268 @@
+//! A world: the graph, and the script that made it and that it calls.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use rhai::Dynamic;
+use umbriel_fields::{FieldId, FrameReport, Graph, Host, NodeId};
+use umbriel_scenegraph::new_graph;
+
+use crate::engine::{Script, on_deep_stack};
+use crate::error::{Problem, ScriptError};
+use crate::limits::Limits;
+use crate::source::Source;
+use crate::stage::{Node, Stage};
+
+/// What a world may use and where its assets lie.
+#[derive(Clone, Debug, Default)]
+pub struct Settings {
+    /// Bounds on what its scripts may use.
+    pub limits: Limits,
+    /// Folders that models are read from, after the folder of the world's file.
+    pub asset_folders: Vec<PathBuf>,
+}
+
+/// A running world.
+pub struct World {
+    graph: Graph,
+    script: Script,
+    settings: Settings,
+    path: Option<PathBuf>,
+    problems: Vec<Problem>,
+    files: BTreeSet<PathBuf>,
+    time_s: Option<f64>,
+    generation: u64,
+}
+
+impl World {
+    /// A world without script: the graph has the Group `world` and nothing else.
+    pub fn new() -> Self {
+        let (graph, script) = empty(&Settings::default(), None);
+        Self::of(graph, script, Settings::default(), None)
+    }
+
+    /// Loads a world's file and runs it.
+    pub fn load_file(path: impl AsRef<Path>) -> Result<Self, ScriptError> {
+        Self::load_file_with(path, Settings::default())
+    }
+
+    /// Loads a world's file and runs it.
+    pub fn load_file_with(path: impl AsRef<Path>, settings: Settings) -> Result<Self, ScriptError> {
+        let path = path.as_ref();
+        let (graph, script) = load(path, &settings)?;
+        Ok(Self::of(graph, script, settings, Some(path.to_path_buf())))
+    }
+
+    /// Runs a text as a world; the name stands in its messages.
+    pub fn load_source(name: &str, text: &str) -> Result<Self, ScriptError> {
+        Self::load_source_with(name, text, Settings::default())
+    }
+
+    /// Runs a text as a world; what it includes and loads comes from the asset folders.
+    pub fn load_source_with(name: &str, text: &str, settings: Settings) -> Result<Self, ScriptError> {
+        let folder = settings.asset_folders.first().cloned().unwrap_or_default();
+        let source = Source::from_text(name, text, &folder, settings.limits.text)?;
+        let (mut graph, mut script) = empty(&settings, None);
+        run(&mut graph, &mut script, source)?;
+        Ok(Self::of(graph, script, settings, None))
+    }
+
+    fn of(graph: Graph, script: Script, settings: Settings, path: Option<PathBuf>) -> Self {
+        let mut world =
+            Self { graph, script, settings, path, problems: Vec::new(), files: BTreeSet::new(), time_s: None, generation: 0 };
+        world.collect();
+        world
+    }
+
+    /// The graph.
+    pub fn graph(&self) -> &Graph {
+        &self.graph
+    }
+
+    /// The graph, to be changed between frames.
+    pub fn graph_mut(&mut self) -> &mut Graph {
+        &mut self.graph
+    }
+
+    /// Runs one frame: the script's frame handlers, then the graph's evaluation with its handlers and node types.
+    /// Time in seconds; one that is no number, or that runs backwards, is taken for the last one.
+    pub fn step(&mut self, time_s: f64) -> FrameReport {
+        let last = self.time_s.unwrap_or(if time_s.is_finite() { time_s } else { 0.0 });
+        let time_s = if time_s.is_finite() { time_s.max(last) } else { last };
+        self.time_s = Some(time_s);
+        let report = on_deep_stack(|| {
+            self.script.stage.time_s.set(time_s);
+            call_on_frame(&mut self.graph, &self.script, time_s, time_s - last);
+            self.graph.evaluate(time_s, &mut Callbacks { script: &self.script, time_s })
+        });
+        self.collect();
+        report
+    }
+
+    /// Runs a text in the running world, as typed at a console, and gives the value as text. Top-level variables of the
+    /// world's script are there.
+    pub fn console(&mut self, text: &str) -> Result<String, Problem> {
+        let stage = self.script.stage.clone();
+        let result = on_deep_stack(|| stage.with(&mut self.graph, || self.script.console(text)));
+        self.collect();
+        result
+    }
+
+    /// The problems since the last call, each once, oldest first.
+    pub fn problems(&mut self) -> Vec<Problem> {
+        std::mem::take(&mut self.problems)
+    }
+
+    /// The files that the world depends on: its script, what that includes, and the models that it loads.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.files.iter().map(PathBuf::as_path)
+    }
+
+    /// How often the world was reloaded. After a reload the graph is another one, and ids and revisions of the old one mean
+    /// nothing any more.
+    pub fn generation(&self) -> u64 {
+        self.generation
+    }
+
+    /// Runs the world's file anew, in a fresh graph; where the visitor stands (Navigation, User) is kept. If the file is
+    /// wrong, that becomes a problem, the old world stays, and the result is false. False too for a world without file.
+    pub fn reload(&mut self) -> bool {
+        let Some(path) = self.path.clone() else { return false };
+        match load(&path, &self.settings) {
+            Ok((mut graph, script)) => {
+                keep_poses(&self.graph, &mut graph);
+                self.graph = graph;
+                self.script = script;
+                self.generation += 1;
+                self.files.clear();
+                self.collect();
+                true
+            }
+            Err(error) => {
+                self.problems.push(problem_of(error, &path));
+                false
+            }
+        }
+    }
+
+    fn collect(&mut self) {
+        let stage = &self.script.stage;
+        self.problems.append(&mut stage.problems.borrow_mut());
+        self.files.extend(stage.source.borrow().files.iter().cloned());
+        self.files.append(&mut stage.files.borrow_mut());
+    }
+}
+
+impl Default for World {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn problem_of(error: ScriptError, path: &Path) -> Problem {
+    match error {
+        ScriptError::Script(problem) => problem,
+        unreadable => Problem {
+            message: unreadable.to_string(),
+            file: path.to_string_lossy().into_owned(),
+            line: 0,
+            column: 0,
+            node: None,
+            field: None,
+            calls: Vec::new(),
+        },
+    }
+}
+
+fn load(path: &Path, settings: &Settings) -> Result<(Graph, Script), ScriptError> {
+    let source = Source::read(path, settings.limits.text)?;
+    let (mut graph, mut script) = empty(settings, path.parent());
+    run(&mut graph, &mut script, source)?;
+    Ok((graph, script))
+}
+
+fn empty(settings: &Settings, folder: Option<&Path>) -> (Graph, Script) {
+    let folders = folder.map(Path::to_path_buf).into_iter().chain(settings.asset_folders.iter().cloned()).collect();
+    let graph = new_graph();
+    let world = graph.find(umbriel_scenegraph::WORLD).map(Node);
+    (graph, Script::new(Stage::new(settings.limits.clone(), folders), world))
+}
+
+fn run(graph: &mut Graph, script: &mut Script, source: Source) -> Result<(), Problem> {
+    let stage = script.stage.clone();
+    on_deep_stack(|| stage.with(graph, || script.run(source)))
+}
+
+fn call_on_frame(graph: &mut Graph, script: &Script, time_s: f64, dt_s: f64) {
+    let stage = &script.stage;
+    let ids: Vec<u64> = stage.on_frame.borrow().keys().copied().collect();
+    for id in ids {
+        // One handler may have stopped another.
+        let Some(handler) = stage.on_frame.borrow().get(&id).cloned() else { continue };
+        stage.with(graph, || {
+            if let Err(problem) = script.call(&handler, vec![time_s.into(), dt_s.into()]) {
+                switch_off(stage, problem, "this on_frame handler is switched off");
+                stage.stop(id);
+            }
+        });
+    }
+}
+
+fn switch_off(stage: &Rc<Stage>, mut problem: Problem, consequence: &str) {
+    problem.message = format!("{}; {consequence}", problem.message);
+    stage.problems.borrow_mut().push(problem);
+}
+
+/// Calls into the script while the graph is evaluated.
+struct Callbacks<'a> {
+    script: &'a Script,
+    time_s: f64,
+}
+
+impl Host for Callbacks<'_> {
+    fn field_changed(&mut self, graph: &mut Graph, _: FieldId, token: u64) {
+        let stage = &self.script.stage;
+        let Some(handler) = stage.on_change.borrow().get(&token).cloned() else { return };
+        stage.with(graph, || {
+            let me = handler.me.map(Dynamic::from);
+            let values = me.into_iter().chain([stage.value(handler.field)]).collect();
+            if let Err(mut problem) = self.script.call(&handler.call, values) {
+                let node = Node(handler.field.node);
+                problem.node = problem.node.or_else(|| Some(stage.label(node)));
+                switch_off(stage, problem, "this on_change handler is switched off");
+                stage.stop(token);
+            }
+        });
+    }
+
+    fn evaluate(&mut self, graph: &mut Graph, node: NodeId) {
+        let stage = &self.script.stage;
+        if !graph.contains(node) || stage.switched_off.borrow().contains(&node) {
+            return;
+        }
+        let definition = stage.definitions.borrow().get(&*graph.type_of(node).name).cloned();
+        let Some(evaluate) = definition.and_then(|d| d.evaluate) else { return };
+        stage.with(graph, || {
+            if let Err(mut problem) = self.script.call(&evaluate, vec![Node(node).into(), self.time_s.into()]) {
+                let label = stage.label(Node(node));
+                problem.node = problem.node.or_else(|| Some(label.clone()));
+                switch_off(stage, problem, &format!("evaluate of {label} is switched off"));
+                stage.switched_off.borrow_mut().insert(node);
+            }
+        });
+    }
+}
+
+/// Takes over where the visitor stands and how he moves.
+fn keep_poses(old: &Graph, new: &mut Graph) {
+    for node_type in ["Navigation", "User"] {
+        let of_type = |graph: &Graph| graph.nodes().find(|id| &*graph.type_of(*id).name == node_type);
+        let (Some(from), Some(to)) = (of_type(old), of_type(new)) else { continue };
+        for field in ["position", "orientation", "scale"] {
+            if let Ok(value) = old.value_named(from, field) {
+                let _ = new.set_named(to, field, value); // the types are the same; a field that is not there is not kept
+            }
+        }
+    }
+}
