@@ -5,7 +5,7 @@ use glam::{Mat4, Vec3, Vec4};
 use std::sync::Arc;
 
 /// Everything that is drawn in a frame, in world space. Kept from frame to frame and updated in place.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Scene {
     /// Shapes. A place may be vacant ([`Drawable::visible`] false); places keep their shape as long as it lives.
     pub drawables: Vec<Drawable>,
@@ -21,6 +21,21 @@ pub struct Scene {
     pub fog: Option<Fog>,
     /// Factor of the linear picture before it is encoded; 1 leaves it.
     pub exposure: f32,
+}
+
+impl Default for Scene {
+    /// Nothing, as a camera without correction sees it.
+    fn default() -> Scene {
+        Scene {
+            drawables: Vec::new(),
+            lights: Vec::new(),
+            stencil_groups: Vec::new(),
+            ambient: Vec3::ZERO,
+            background: Background::default(),
+            fog: None,
+            exposure: 1.0,
+        }
+    }
 }
 
 /// One shape at one place.

@@ -1,0 +1,145 @@
+//! Materials on the GPU: a uniform and the pictures that it names.
+
+use super::texture::{make_sampler, make_texture};
+use crate::uniforms;
+use std::collections::HashMap;
+use std::sync::Arc;
+use umbriel_scene::{AlphaMode, Image, Material, Sampler, Shading, TextureRef};
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+
+/// A material ready to be drawn with.
+pub(crate) struct GpuMaterial {
+    pub(crate) group: wgpu::BindGroup,
+    pub(crate) alpha: AlphaMode,
+    pub(crate) double_sided: bool,
+    /// Keeps the pictures, which other materials may share.
+    _pictures: Vec<Arc<Picture>>,
+}
+
+struct Picture {
+    view: wgpu::TextureView,
+    /// Keeps the address that the picture is found by.
+    _image: Option<Arc<Image>>,
+}
+
+/// Makes materials, sharing pictures and samplers among them.
+pub(crate) struct MaterialCache {
+    pictures: HashMap<(usize, bool), std::sync::Weak<Picture>>,
+    samplers: HashMap<Sampler, wgpu::Sampler>,
+    white: Arc<Picture>,
+}
+
+impl MaterialCache {
+    pub(crate) fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<MaterialCache, String> {
+        let image = Image { width: 1, height: 1, rgba: Arc::new([255; 4]) };
+        let white = Arc::new(Picture { view: make_texture(device, queue, &image, false)?, _image: None });
+        Ok(MaterialCache { pictures: HashMap::new(), samplers: HashMap::new(), white })
+    }
+
+    /// Sends a material to the GPU. What is wrong with its pictures goes to `report`, and they stay white.
+    pub(crate) fn make(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        layout: &wgpu::BindGroupLayout,
+        material: &Material,
+        mut report: impl FnMut(String),
+    ) -> GpuMaterial {
+        let slots = [
+            (&material.base_color_texture, true),
+            (&material.metallic_roughness_texture, false),
+            (&material.normal_texture, false),
+            (&material.occlusion_texture, false),
+            (&material.emissive_texture, true),
+        ];
+        let mut uniform = uniform_of(material);
+        let mut bound = Vec::new();
+        for (i, (texture, srgb)) in slots.into_iter().enumerate() {
+            let sampler = texture.as_ref().map(|t| t.sampler).unwrap_or_default();
+            let sampler = self.samplers.entry(sampler).or_insert_with(|| make_sampler(device, sampler)).clone();
+            let picture = texture.as_ref().and_then(|t| match self.picture(device, queue, &t.image, srgb) {
+                Ok(picture) => Some((picture, slot_of(t))),
+                Err(message) => {
+                    report(format!("material '{}': {message}", material.name));
+                    None
+                }
+            });
+            let (picture, slot) = picture.unwrap_or_else(|| (self.white.clone(), bytemuck::Zeroable::zeroed()));
+            uniform.textures[i] = slot;
+            bound.push((picture, sampler));
+        }
+        let contents = bytemuck::bytes_of(&uniform);
+        let usage = wgpu::BufferUsages::UNIFORM;
+        let buffer = device.create_buffer_init(&BufferInitDescriptor { label: Some("material"), contents, usage });
+        let mut entries = vec![wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }];
+        for (i, (picture, sampler)) in (0u32..).zip(&bound) {
+            let (texture, look_up) = (wgpu::BindingResource::TextureView(&picture.view), wgpu::BindingResource::Sampler(sampler));
+            entries.push(wgpu::BindGroupEntry { binding: 1 + 2 * i, resource: texture });
+            entries.push(wgpu::BindGroupEntry { binding: 2 + 2 * i, resource: look_up });
+        }
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("material"), layout, entries: &entries });
+        GpuMaterial {
+            group,
+            alpha: material.alpha,
+            double_sided: material.double_sided,
+            _pictures: bound.into_iter().map(|b| b.0).collect(),
+        }
+    }
+
+    /// Forgets pictures that no material holds.
+    pub(crate) fn drop_unused(&mut self) {
+        self.pictures.retain(|_, picture| picture.strong_count() > 0);
+    }
+
+    fn picture(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        image: &Arc<Image>,
+        srgb: bool,
+    ) -> Result<Arc<Picture>, String> {
+        let key = (Arc::as_ptr(image) as usize, srgb);
+        if let Some(picture) = self.pictures.get(&key).and_then(|p| p.upgrade()) {
+            return Ok(picture);
+        }
+        let view = make_texture(device, queue, image, srgb)?;
+        let picture = Arc::new(Picture { view, _image: Some(image.clone()) });
+        self.pictures.insert(key, Arc::downgrade(&picture));
+        Ok(picture)
+    }
+}
+
+fn slot_of(texture: &TextureRef) -> uniforms::Texture {
+    let m = texture.uv_from_mesh;
+    uniforms::Texture {
+        linear: [m.matrix2.x_axis.x, m.matrix2.x_axis.y, m.matrix2.y_axis.x, m.matrix2.y_axis.y],
+        offset: m.translation.to_array(),
+        uv_set: u32::from(texture.uv_set),
+        present: 1,
+    }
+}
+
+fn uniform_of(material: &Material) -> uniforms::Material {
+    let mut uniform: uniforms::Material = bytemuck::Zeroable::zeroed();
+    uniform.base_color = material.base_color.to_array();
+    uniform.emissive = material.emissive.to_array();
+    uniform.normal_scale = material.normal_scale;
+    uniform.occlusion_strength = material.occlusion_strength;
+    uniform.ambient = 1.0;
+    match material.shading {
+        Shading::MetallicRoughness { metallic, roughness } => {
+            (uniform.metallic, uniform.roughness, uniform.shading) = (metallic, roughness, 0);
+        }
+        Shading::Phong { specular, exponent, ambient_intensity } => {
+            uniform.specular = specular.to_array();
+            (uniform.exponent, uniform.ambient, uniform.shading) = (exponent.max(0.0), ambient_intensity, 1);
+        }
+        Shading::Unlit => uniform.shading = 2,
+    }
+    match material.alpha {
+        AlphaMode::Opaque => {}
+        AlphaMode::Mask { cutoff } => (uniform.alpha_mode, uniform.alpha_cutoff) = (1, cutoff),
+        AlphaMode::Blend => uniform.alpha_mode = 2,
+    }
+    uniform
+}

@@ -1,0 +1,10 @@
+//! What stays on the GPU from frame to frame, recognised by the identity of its `Arc`.
+
+mod material;
+mod mesh;
+mod slab;
+mod texture;
+
+pub(crate) use material::{GpuMaterial, MaterialCache};
+pub(crate) use mesh::{GpuMesh, VERTEX_BUFFERS, make_mesh};
+pub(crate) use slab::Slab;

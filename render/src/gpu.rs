@@ -1,0 +1,110 @@
+//! The graphics device: found here, or made elsewhere (OpenXR must make its own).
+
+use crate::Error;
+use std::sync::{Arc, Mutex};
+
+/// Depth and stencil of every view.
+pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32FloatStencil8;
+/// Linear picture of a view before it is encoded.
+pub(crate) const LINEAR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+/// Samples per pixel of a view.
+pub(crate) const SAMPLES: u32 = 4;
+
+/// A device that can draw, and what led to it.
+#[derive(Clone)]
+pub struct Gpu {
+    /// Makes surfaces of windows.
+    pub instance: wgpu::Instance,
+    /// The chosen driver.
+    pub adapter: wgpu::Adapter,
+    /// Makes resources.
+    pub device: wgpu::Device,
+    /// Takes work.
+    pub queue: wgpu::Queue,
+    /// Name and kind of the driver.
+    pub info: wgpu::AdapterInfo,
+    /// Mistakes that the device reported on its own.
+    pub(crate) reports: Arc<Mutex<Vec<String>>>,
+}
+
+impl Gpu {
+    /// An instance to make the surface of a window with, for [`Gpu::new`].
+    pub fn instance() -> wgpu::Instance {
+        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
+    }
+
+    /// Finds the fastest device that can draw, software last. For windows give the instance and a surface that it made.
+    pub fn new(compatible: Option<(wgpu::Instance, &wgpu::Surface<'_>)>) -> Result<Gpu, Error> {
+        let (instance, surface) = match compatible {
+            Some((instance, surface)) => (instance, Some(surface)),
+            None => (Gpu::instance(), None),
+        };
+        let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+        adapters.retain(|a| surface.is_none_or(|s| a.is_surface_supported(s)));
+        adapters.sort_by_key(|a| rank(a.get_info().device_type));
+        let mut reasons = Vec::new();
+        for adapter in adapters {
+            match open(&instance, adapter) {
+                Ok(gpu) => return Ok(gpu),
+                Err(error) => reasons.push(error.to_string()),
+            }
+        }
+        let found = if reasons.is_empty() { "no driver answered".to_owned() } else { reasons.join("; ") };
+        Err(Error::NoDevice(found))
+    }
+
+    /// Takes a device that was made elsewhere; it must have [`Gpu::required_features`].
+    pub fn from_parts(
+        instance: wgpu::Instance,
+        adapter: wgpu::Adapter,
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+    ) -> Result<Gpu, Error> {
+        let info = adapter.get_info();
+        let missing = Gpu::required_features() - device.features();
+        if !missing.is_empty() {
+            return Err(Error::Lacks { device: info.name, what: format!("{missing:?}") });
+        }
+        let reports = Arc::new(Mutex::new(Vec::new()));
+        let sink = reports.clone();
+        device.on_uncaptured_error(Arc::new(move |error| {
+            if let Ok(mut list) = sink.lock() {
+                list.push(format!("graphics device: {error}"));
+            }
+        }));
+        Ok(Gpu { instance, adapter, device, queue, info, reports })
+    }
+
+    /// Features without which nothing is drawn.
+    pub fn required_features() -> wgpu::Features {
+        wgpu::Features::DEPTH32FLOAT_STENCIL8
+    }
+}
+
+fn rank(kind: wgpu::DeviceType) -> u32 {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    }
+}
+
+fn open(instance: &wgpu::Instance, adapter: wgpu::Adapter) -> Result<Gpu, Error> {
+    let info = adapter.get_info();
+    let missing = Gpu::required_features() - adapter.features();
+    if !missing.is_empty() {
+        return Err(Error::Lacks { device: info.name, what: format!("{missing:?}") });
+    }
+    let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::DEPTH_CLIP_CONTROL;
+    let descriptor = wgpu::DeviceDescriptor {
+        label: Some("umbriel"),
+        required_features: Gpu::required_features() | (adapter.features() & wanted),
+        required_limits: adapter.limits(),
+        ..Default::default()
+    };
+    let (device, queue) =
+        pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| Error::NoDevice(format!("{}: {e}", info.name)))?;
+    Gpu::from_parts(instance.clone(), adapter, device, queue)
+}

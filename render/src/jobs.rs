@@ -1,0 +1,83 @@
+//! What the shadow volumes are made of: one job per light that is added outside its shadow, one per film.
+
+use crate::cache::{GpuMesh, Slab};
+use crate::deform::Deformer;
+use crate::draws::Draws;
+use crate::lights::Lights;
+use crate::plan::{BLACK_FILM, Purpose};
+use crate::slots::Slots;
+use crate::uniforms;
+use crate::volumes::{VolumeCaster, VolumeJob, VolumeLight};
+use glam::{Vec3, Vec4};
+use umbriel_scene::{Light, LightKind, Mesh, Scene, ShadowMethod, StencilMode};
+
+/// All jobs of the frame and what each is for. Films are added to `films`.
+pub(crate) fn jobs(
+    scene: &Scene,
+    lights: &Lights,
+    draws: &Draws,
+    meshes: &Slab<Mesh, Option<GpuMesh>>,
+    deformer: &Deformer,
+    films: &mut Slots<uniforms::Film>,
+) -> (Vec<VolumeJob>, Vec<Purpose>) {
+    let black = films.push(&uniforms::Film { color: [0.0, 0.0, 0.0, 1.0] });
+    debug_assert_eq!(black, BLACK_FILM);
+    let caster = |index: usize| caster(scene, draws, meshes, deformer, index);
+    let (mut jobs, mut purposes) = (Vec::new(), Vec::new());
+    for (place, &index) in lights.order.iter().enumerate().skip(lights.in_surface_pass) {
+        let light = &scene.lights[index];
+        let casters = if light.shadows == ShadowMethod::Volume {
+            draws.drawn().filter(|(_, casts)| *casts).filter_map(|(i, _)| caster(i)).collect()
+        } else {
+            let groups = scene.stencil_groups.iter().filter(|g| g.light == index && g.mode == StencilMode::Additive);
+            let mut members: Vec<usize> = groups.flat_map(|g| g.casters.iter().copied()).collect();
+            members.sort_unstable();
+            members.dedup();
+            members.into_iter().filter_map(caster).collect()
+        };
+        jobs.push(VolumeJob { light: volume_light(light), casters });
+        purposes.push(Purpose::Light(place));
+    }
+    for group in &scene.stencil_groups {
+        let StencilMode::Modulative(film) = group.mode else { continue };
+        if lights.place_of(group.light).is_none() {
+            continue;
+        }
+        let light = &scene.lights[group.light];
+        let [r, g, b, a] = film.color.to_array();
+        let film = films.push(&uniforms::Film { color: [r * a, g * a, b * a, a] });
+        let casters = group.casters.iter().filter_map(|i| caster(*i)).collect();
+        jobs.push(VolumeJob { light: volume_light(light), casters });
+        purposes.push(Purpose::Film { film, light: group.light });
+    }
+    (jobs, purposes)
+}
+
+fn volume_light(light: &Light) -> VolumeLight {
+    let toward_light = match light.kind {
+        LightKind::Directional => -light.direction.normalize_or(Vec3::NEG_Z).extend(0.0),
+        _ => light.position.extend(1.0),
+    };
+    let range = if toward_light.w == 0.0 { f32::INFINITY } else { light.range };
+    VolumeLight { toward_light: Vec4::from(toward_light), range }
+}
+
+fn caster(
+    scene: &Scene,
+    draws: &Draws,
+    meshes: &Slab<Mesh, Option<GpuMesh>>,
+    deformer: &Deformer,
+    index: usize,
+) -> Option<VolumeCaster> {
+    let drawable = scene.drawables.get(index)?;
+    let (mesh, deformed) = draws.mesh_of(index)?;
+    let rest = meshes.get(mesh)?.as_ref()?;
+    let deformed = deformed.and_then(|d| deformer.get(d));
+    Some(VolumeCaster {
+        mesh: meshes.key(mesh)?.clone(),
+        positions: deformed.map_or(&rest.positions, |d| &d.positions).clone(),
+        positions_revision: deformed.map_or(0, |d| d.revision),
+        world_from_object: drawable.world_from_object,
+        bounds_in_world: drawable.bounds_in_world,
+    })
+}

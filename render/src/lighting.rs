@@ -1,0 +1,108 @@
+//! Instances, lights, maps and surroundings of the frame as bind groups.
+
+use crate::buffer::GrowBuffer;
+use crate::draws::Draws;
+use crate::layouts::Layouts;
+use crate::lights::{self, Lights};
+use crate::maps::Maps;
+use crate::uniforms;
+use glam::Vec3;
+use umbriel_scene::{FogKind, Scene};
+use wgpu::BufferUsages;
+
+/// Buffers that all surface passes read.
+pub(crate) struct Lighting {
+    instances: GrowBuffer,
+    frame: GrowBuffer,
+    lights: GrowBuffer,
+    faces: GrowBuffer,
+    instances_group: Option<wgpu::BindGroup>,
+    group: Option<wgpu::BindGroup>,
+}
+
+impl Lighting {
+    pub(crate) fn new(device: &wgpu::Device) -> Lighting {
+        let storage = |label| GrowBuffer::new(device, label, BufferUsages::STORAGE, 1 << 12);
+        Lighting {
+            instances: storage("instances"),
+            frame: GrowBuffer::new(device, "surroundings", BufferUsages::UNIFORM, 256),
+            lights: storage("lights"),
+            faces: storage("map faces"),
+            instances_group: None,
+            group: None,
+        }
+    }
+
+    /// The texture of the maps is another one now.
+    pub(crate) fn forget_maps(&mut self) {
+        self.group = None;
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "all that surfaces read")]
+    pub(crate) fn upload(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        layouts: &Layouts,
+        scene: &Scene,
+        lights: &Lights,
+        maps: &Maps,
+        draws: &Draws,
+    ) {
+        if self.instances.write(device, queue, bytemuck::cast_slice(&draws.instances)) {
+            self.instances_group = None;
+        }
+        let list: Vec<uniforms::Light> =
+            lights.order.iter().map(|i| lights::uniform_of(&scene.lights[*i], maps.faces_of(*i))).collect();
+        let mut grown = self.frame.write(device, queue, bytemuck::bytes_of(&frame_of(scene, list.len())));
+        grown |= self.lights.write(device, queue, bytemuck::cast_slice(&list));
+        grown |= self.faces.write(device, queue, bytemuck::cast_slice(&maps.uniforms()));
+        if grown {
+            self.group = None;
+        }
+        self.instances_group.get_or_insert_with(|| {
+            let entries = &[entry(0, self.instances.buffer.as_entire_binding())];
+            let layout = &layouts.instances;
+            device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("instances"), layout, entries })
+        });
+        self.group.get_or_insert_with(|| {
+            let entries = &[
+                entry(0, self.frame.buffer.as_entire_binding()),
+                entry(1, self.lights.buffer.as_entire_binding()),
+                entry(2, self.faces.buffer.as_entire_binding()),
+                entry(3, wgpu::BindingResource::TextureView(&maps.whole)),
+                entry(4, wgpu::BindingResource::Sampler(&maps.sampler)),
+            ];
+            let layout = &layouts.lighting;
+            device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lighting"), layout, entries })
+        });
+    }
+
+    pub(crate) fn instances(&self) -> Option<&wgpu::BindGroup> {
+        self.instances_group.as_ref()
+    }
+
+    pub(crate) fn group(&self) -> Option<&wgpu::BindGroup> {
+        self.group.as_ref()
+    }
+}
+
+fn entry(binding: u32, resource: wgpu::BindingResource<'_>) -> wgpu::BindGroupEntry<'_> {
+    wgpu::BindGroupEntry { binding, resource }
+}
+
+fn frame_of(scene: &Scene, light_count: usize) -> uniforms::Frame {
+    let fog = scene.fog.filter(|f| f.visibility_range > 0.0);
+    let background = &scene.background;
+    uniforms::Frame {
+        ambient: scene.ambient.extend(0.0).to_array(),
+        zenith: background.zenith.extend(1.0).to_array(),
+        horizon: background.horizon.extend(1.0).to_array(),
+        nadir: background.nadir.extend(1.0).to_array(),
+        fog_color: fog.map_or(Vec3::ZERO, |f| f.color).to_array(),
+        fog_range: fog.map_or(0.0, |f| f.visibility_range),
+        fog_kind: u32::from(fog.is_some_and(|f| f.kind == FogKind::Exponential)),
+        light_count: light_count as u32,
+        spare: [0; 2],
+    }
+}

@@ -1,0 +1,74 @@
+//! The lights of a frame in the order in which the passes take them.
+
+use crate::uniforms;
+use glam::Vec3;
+use umbriel_scene::{Light, LightKind, MapFilter, Scene, ShadowMethod, StencilMode};
+
+/// Lights by pass: those of the surface pass first, then those that are added one by one outside their stencil shadows.
+#[derive(Default)]
+pub(crate) struct Lights {
+    /// Places in [`Scene::lights`], in the order of the GPU's list.
+    pub(crate) order: Vec<usize>,
+    /// How many of them the surface pass takes.
+    pub(crate) in_surface_pass: usize,
+}
+
+impl Lights {
+    pub(crate) fn new(scene: &Scene) -> Lights {
+        let is_masked = |i: usize| scene.lights[i].shadows == ShadowMethod::Volume || has_additive_group(scene, i);
+        let (masked, mut order): (Vec<usize>, Vec<usize>) =
+            (0..scene.lights.len()).filter(|i| shines(&scene.lights[*i])).partition(|i| is_masked(*i));
+        let in_surface_pass = order.len();
+        order.extend(masked);
+        Lights { order, in_surface_pass }
+    }
+
+    /// Place of a scene's light in the GPU's list.
+    pub(crate) fn place_of(&self, light: usize) -> Option<usize> {
+        self.order.iter().position(|i| *i == light)
+    }
+}
+
+/// Finite numbers and some light: anything else is left out.
+pub(crate) fn shines(light: &Light) -> bool {
+    let numbers = [light.position, light.direction, light.color, light.attenuation];
+    numbers.iter().all(|v| v.is_finite()) && light.intensity.is_finite() && light.direction != Vec3::ZERO
+}
+
+/// Is a light masked by a group's shadow?
+pub(crate) fn has_additive_group(scene: &Scene, light: usize) -> bool {
+    scene.stencil_groups.iter().any(|g| g.light == light && g.mode == StencilMode::Additive)
+}
+
+/// A light for the shaders. `faces` are its faces in the list of map faces: first and count.
+pub(crate) fn uniform_of(light: &Light, faces: (u32, u32)) -> uniforms::Light {
+    let (kind, cos_inner, cos_outer) = match light.kind {
+        LightKind::Directional => (0, 1.0, -1.0),
+        LightKind::Spot { inner_rad, outer_rad } => (1, inner_rad.min(outer_rad).cos(), outer_rad.cos()),
+        LightKind::Point => (2, 1.0, -1.0),
+    };
+    let map = &light.map;
+    uniforms::Light {
+        position: light.position.to_array(),
+        kind,
+        direction: light.direction.normalize_or(Vec3::NEG_Z).to_array(),
+        range: light.range.min(f32::MAX),
+        color: (light.color * light.intensity).to_array(),
+        shadow_intensity: light.shadow_intensity.clamp(0.0, 1.0),
+        ambient: (light.color * light.ambient_intensity).to_array(),
+        cos_outer,
+        attenuation: light.attenuation.to_array(),
+        cone_scale: 1.0 / (cos_inner - cos_outer).max(1e-4),
+        first_face: faces.0,
+        face_count: faces.1,
+        filter_width: match map.filter {
+            MapFilter::None => 0.0,
+            MapFilter::Hardware => 1.0,
+            MapFilter::Pcf4 => 2.0,
+            MapFilter::Pcf16 => 4.0,
+        },
+        slope_bias: map.slope_bias.map_or(-1.0, |b| b.max(0.0)),
+        constant_bias: map.constant_bias.map_or(-1.0, |b| b.max(0.0)),
+        spare: [0; 3],
+    }
+}

@@ -1,0 +1,87 @@
+//! Which part of the world each shadow map shows.
+
+use glam::{Mat4, Vec3, Vec4};
+use umbriel_scene::{Light, LightKind, MapSettings};
+
+/// Half angle of a cone beyond which six maps see it better than one.
+const WIDEST_CONE_RAD: f32 = 1.2;
+/// Texels around a map that filters and bias may read.
+pub(crate) const MARGIN_TEXELS: f32 = 8.0;
+/// Nearest caster of a light with a position, metres. Reversed depth keeps its precision at any distance.
+const NEAR: f32 = 1e-3;
+
+/// What one map shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Projection {
+    pub(crate) map_from_world: Mat4,
+    /// Towards the light (w = 0) or its position (w = 1).
+    pub(crate) eye: Vec4,
+    /// Size of a texel at distance 1 (w = 1) or everywhere, metres.
+    pub(crate) texel: f32,
+}
+
+/// Rotation into the frame of a light that travels along `direction` = -z.
+pub(crate) fn light_from_world(direction: Vec3) -> Mat4 {
+    let z = -direction;
+    let up = if z.y.abs() > 0.99 { Vec3::Z } else { Vec3::Y };
+    let x = up.cross(z).normalize();
+    Mat4::from_cols(x.extend(0.0), z.cross(x).extend(0.0), z.extend(0.0), Vec4::W).transpose()
+}
+
+/// Window at distance 1 and depth reversed; without `far` it is at infinity.
+fn perspective([l, r, b, t]: [f32; 4], near: f32, far: Option<f32>) -> Mat4 {
+    let (scale, offset) = match far {
+        Some(far) => (near / (far - near), near * far / (far - near)),
+        None => (0.0, near),
+    };
+    Mat4::from_cols(
+        Vec4::new(2.0 / (r - l), 0.0, 0.0, 0.0),
+        Vec4::new(0.0, 2.0 / (t - b), 0.0, 0.0),
+        Vec4::new((r + l) / (r - l), (t + b) / (t - b), scale, -1.0),
+        Vec4::new(0.0, 0.0, offset, 0.0),
+    )
+}
+
+/// Box of parallel light: depth 1 at distance `near` along -z, 0 at `far`.
+pub(crate) fn parallel([l, r, b, t]: [f32; 4], near: f32, far: f32) -> Mat4 {
+    Mat4::from_cols(
+        Vec4::new(2.0 / (r - l), 0.0, 0.0, 0.0),
+        Vec4::new(0.0, 2.0 / (t - b), 0.0, 0.0),
+        Vec4::new(0.0, 0.0, 1.0 / (far - near), 0.0),
+        Vec4::new(-(r + l) / (r - l), -(t + b) / (t - b), far / (far - near), 1.0),
+    )
+}
+
+/// A window that can be divided by, or nothing.
+fn usable(settings: &MapSettings) -> (Option<[f32; 4]>, f32, Option<f32>) {
+    let window = settings.frustum.filter(|[l, r, b, t]| r > l && t > b && [l, r, b, t].iter().all(|v| v.is_finite()));
+    let range = settings.near_far.filter(|[n, f]| *n > 0.0 && f > n && f.is_finite());
+    (window, range.map_or(NEAR, |r| r[0]), range.map(|r| r[1]))
+}
+
+/// The map of a spot light, or six where its cone is too wide for one.
+pub(crate) fn spot(light: &Light, size: u32) -> Vec<Projection> {
+    let LightKind::Spot { outer_rad, .. } = light.kind else { return point(light, size) };
+    if outer_rad > WIDEST_CONE_RAD {
+        return point(light, size);
+    }
+    let (window, near, far) = usable(&light.map);
+    let edge = outer_rad.max(1e-3).tan() * (1.0 + 2.0 * MARGIN_TEXELS / size as f32);
+    let [l, r, b, t] = window.unwrap_or([-edge, edge, -edge, edge]);
+    let view = light_from_world(light.direction.normalize_or(Vec3::NEG_Z)) * Mat4::from_translation(-light.position);
+    let map_from_world = perspective([l, r, b, t], near, far) * view;
+    vec![Projection { map_from_world, eye: light.position.extend(1.0), texel: (r - l).max(t - b) / size as f32 }]
+}
+
+/// The six maps of a point light: +x -x +y -y +z -z. Each is a little wider than a right angle, for seams.
+pub(crate) fn point(light: &Light, size: u32) -> Vec<Projection> {
+    let (_, near, far) = usable(&light.map);
+    let edge = 1.0 + 2.0 * MARGIN_TEXELS / size as f32;
+    let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+    axes.map(|axis| {
+        let view = light_from_world(axis) * Mat4::from_translation(-light.position);
+        let map_from_world = perspective([-edge, edge, -edge, edge], near, far) * view;
+        Projection { map_from_world, eye: light.position.extend(1.0), texel: 2.0 * edge / size as f32 }
+    })
+    .to_vec()
+}

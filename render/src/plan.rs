@@ -1,0 +1,219 @@
+//! What is drawn for each view, decided before anything is recorded.
+
+use crate::cull::Planes;
+use crate::draws::{Alpha, Draw, Draws};
+use crate::lights::Lights;
+use crate::slots::Slots;
+use crate::stats::{FrameStats, Problems};
+use crate::surface::Pass;
+use crate::uniforms;
+use glam::{Mat4, Vec3};
+use umbriel_scene::{Layout, Picture, PictureKind, Rect, Scene, View};
+
+/// One view of one picture.
+pub(crate) struct ViewPlan {
+    pub(crate) picture: usize,
+    pub(crate) layer: usize,
+    /// Where it goes in its layer.
+    pub(crate) rect: Rect,
+    /// Place in the pipelines of composition: all channels, red, green and blue.
+    pub(crate) channels: usize,
+    pub(crate) size: [u32; 2],
+    pub(crate) is_visibility: bool,
+    pub(crate) base_slot: usize,
+    pub(crate) opaque: Vec<Draw>,
+    pub(crate) blend_slot: usize,
+    pub(crate) blended: Vec<Draw>,
+    /// Shadow volumes and what is done with each.
+    pub(crate) steps: Vec<Step>,
+}
+
+/// A job of the shadow volumes, and what follows it.
+pub(crate) struct Step {
+    pub(crate) job: usize,
+    pub(crate) then: Then,
+}
+
+/// What is done where a job's volumes were counted.
+pub(crate) enum Then {
+    /// Light is added outside: number of the view with that light.
+    Light { slot: usize },
+    /// A film is laid inside: number of the film.
+    Film { slot: usize },
+}
+
+/// What the jobs of the frame are for.
+pub(crate) enum Purpose {
+    /// The light at this place of the GPU's list.
+    Light(usize),
+    /// The film at this number, for the light at this place of the scene.
+    Film { film: usize, light: usize },
+}
+
+/// Number of the film that hides all light.
+pub(crate) const BLACK_FILM: usize = 0;
+
+/// The frame as plans see it.
+pub(crate) struct Frame<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) lights: &'a Lights,
+    pub(crate) purposes: &'a [Purpose],
+}
+
+impl ViewPlan {
+    pub(crate) fn base_pass(&self) -> Pass {
+        if self.is_visibility { Pass::Visibility } else { Pass::Base }
+    }
+
+    pub(crate) fn add_pass(&self) -> Pass {
+        if self.is_visibility { Pass::VisibilityAdd } else { Pass::Add }
+    }
+}
+
+/// A picture that cannot be drawn is left out, with a report.
+pub(crate) fn is_drawable(picture: &Picture, limit: u32, problems: &mut Problems) -> bool {
+    let [width, height] = picture.size;
+    let name = &picture.name;
+    if width == 0 || height == 0 || width > limit || height > limit {
+        problems.report(format!("picture '{name}' of {width} x {height}: the device takes 1 to {limit} each way"));
+        return false;
+    }
+    if picture.views.is_empty() {
+        problems.report(format!("picture '{name}' has no views"));
+        return false;
+    }
+    true
+}
+
+/// Rectangle, layer and channels of a view in its picture.
+fn place_of(picture: &Picture, index: usize) -> Option<(Rect, usize, usize)> {
+    let [width, height] = picture.size;
+    let whole = Rect { x: 0, y: 0, width, height };
+    match &picture.layout {
+        Layout::Tiles(rects) => {
+            let rect = *rects.get(index)?;
+            let fits = rect.x.checked_add(rect.width)? <= width && rect.y.checked_add(rect.height)? <= height;
+            (fits && rect.width > 0 && rect.height > 0).then_some((rect, 0, 0))
+        }
+        Layout::Anaglyph => (index < 2).then_some((whole, 0, index + 1)),
+        Layout::Layers => Some((whole, index, 0)),
+    }
+}
+
+/// Plans every view of a picture.
+#[allow(clippy::too_many_arguments, reason = "the frame's lists that a plan adds to")]
+pub(crate) fn plan_picture(
+    number: usize,
+    picture: &Picture,
+    frame: &Frame<'_>,
+    draws: &mut Draws,
+    slots: &mut Slots<uniforms::View>,
+    problems: &mut Problems,
+    stats: &mut FrameStats,
+    limit: u32,
+) -> Vec<ViewPlan> {
+    let mut plans = Vec::new();
+    for (index, view) in picture.views.iter().enumerate() {
+        let Some((rect, layer, channels)) = place_of(picture, index) else {
+            problems.report(format!("picture '{}': view '{}' has no place inside of it", picture.name, view.name));
+            continue;
+        };
+        if let Some(wrong) = what_is_wrong(view, limit) {
+            problems.report(format!("picture '{}': view '{}' {wrong}", picture.name, view.name));
+            continue;
+        }
+        let shown = shown_light(picture, frame, problems);
+        let clip_from_world = view.frustum.clip_from_view() * view.view_from_world;
+        let planes = Planes::new(&clip_from_world);
+        let (opaque, outside) = draws.cull(&planes, |alpha, _, _| alpha != Alpha::Blend);
+        let is_visibility = picture.kind != PictureKind::Colour;
+        let (blended, blended_outside) =
+            if is_visibility { (Vec::new(), 0) } else { draws.back_to_front(&planes, &view.view_from_world) };
+        stats.culled += (outside + blended_outside) as u32;
+        stats.views += 1;
+        let mut uniform = uniform_of(view, rect, frame.scene.exposure);
+        let mut slot_with = |first: usize, count: usize| {
+            uniform.first_light = first as u32;
+            uniform.light_count = count as u32;
+            uniform.shown_light = shown.unwrap_or(0) as u32;
+            slots.push(&uniform)
+        };
+        let wants = |place: usize| !is_visibility || shown == Some(place);
+        let mut steps = Vec::new();
+        for (job, purpose) in frame.purposes.iter().enumerate() {
+            let then = match *purpose {
+                Purpose::Light(place) if wants(place) => Then::Light { slot: slot_with(place, 1) },
+                Purpose::Film { light, .. } if is_visibility && shown.is_some() && shown == frame.lights.place_of(light) => {
+                    Then::Film { slot: BLACK_FILM }
+                }
+                Purpose::Film { film, .. } if !is_visibility => Then::Film { slot: film },
+                _ => continue,
+            };
+            steps.push(Step { job, then });
+        }
+        let in_base = match shown {
+            Some(place) => usize::from(place < frame.lights.in_surface_pass),
+            None if is_visibility => 0,
+            None => frame.lights.in_surface_pass,
+        };
+        plans.push(ViewPlan {
+            picture: number,
+            layer,
+            rect,
+            channels,
+            size: view.size,
+            is_visibility,
+            base_slot: slot_with(0, in_base),
+            blend_slot: slot_with(0, frame.lights.order.len()),
+            opaque,
+            blended,
+            steps,
+        });
+    }
+    plans
+}
+
+/// Place in the GPU's list of the light that a visibility picture shows.
+fn shown_light(picture: &Picture, frame: &Frame<'_>, problems: &mut Problems) -> Option<usize> {
+    let PictureKind::LightVisibility(light) = picture.kind else { return None };
+    let place = frame.lights.place_of(light);
+    if place.is_none() {
+        problems.report(format!(
+            "picture '{}' shows light {light}, but the scene has {} lights that shine",
+            picture.name,
+            frame.lights.order.len()
+        ));
+    }
+    place
+}
+
+fn what_is_wrong(view: &View, limit: u32) -> Option<String> {
+    let [width, height] = view.size;
+    if width == 0 || height == 0 || width > limit || height > limit {
+        return Some(format!("is {width} x {height}: the device takes 1 to {limit} each way"));
+    }
+    let f = &view.frustum;
+    if !(f.right > f.left && f.top > f.bottom && f.near > 0.0) {
+        return Some(format!("has a frustum without content: {f:?}"));
+    }
+    if !view.view_from_world.is_finite() || view.view_from_world.determinant() == 0.0 {
+        return Some("has a matrix that cannot be inverted".to_owned());
+    }
+    None
+}
+
+fn uniform_of(view: &View, rect: Rect, exposure: f32) -> uniforms::View {
+    let clip_from_world: Mat4 = view.frustum.clip_from_view() * view.view_from_world;
+    let eye = view.view_from_world.inverse().transform_point3(Vec3::ZERO);
+    uniforms::View {
+        clip_from_world: clip_from_world.to_cols_array_2d(),
+        world_from_clip: clip_from_world.inverse().to_cols_array_2d(),
+        view_from_world: view.view_from_world.to_cols_array_2d(),
+        eye_in_world: eye.extend(1.0).to_array(),
+        viewport: [rect.x as f32, rect.y as f32, rect.width as f32, rect.height as f32],
+        first_light: 0,
+        light_count: 0,
+        exposure,
+        shown_light: 0,
+    }
+}

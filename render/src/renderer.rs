@@ -1,0 +1,294 @@
+//! The frame: what is prepared, sent and recorded, from top to bottom.
+
+use crate::cache::{GpuMaterial, GpuMesh, MaterialCache, Slab, make_mesh};
+use crate::deform::Deformer;
+use crate::draws::{Caches, Draws};
+use crate::layouts::Layouts;
+use crate::lighting::Lighting;
+use crate::lights::Lights;
+use crate::maps::Maps;
+use crate::plan::{self, Purpose, ViewPlan};
+use crate::read_back::{self, RgbaPixels};
+use crate::record::{Drawer, Recorder};
+use crate::screen::Screen;
+use crate::slots::Slots;
+use crate::stats::{FrameStats, Problems};
+use crate::surface::Surface;
+use crate::targets::{Target, ViewTargets};
+use crate::volumes::{VolumeJob, VolumePass};
+use crate::{Error, Gpu, buffer::GrowBuffer, gpu, jobs, surroundings, uniforms};
+use std::time::Instant;
+use umbriel_scene::{Material, Mesh, Picture, Scene};
+
+/// Draws frames.
+pub struct Renderer {
+    gpu: Gpu,
+    layouts: Layouts,
+    surface: Surface,
+    screen: Screen,
+    maps: Maps,
+    volumes: VolumePass,
+    deformer: Deformer,
+    meshes: Slab<Mesh, Option<GpuMesh>>,
+    materials: Slab<Material, GpuMaterial>,
+    material_cache: MaterialCache,
+    draws: Draws,
+    lighting: Lighting,
+    views: Slots<uniforms::View>,
+    films: Slots<uniforms::Film>,
+    visible: GrowBuffer,
+    view_targets: ViewTargets,
+    targets: Vec<Option<Target>>,
+    problems: Problems,
+    frame: u64,
+}
+
+impl Renderer {
+    /// Makes what every frame needs.
+    pub fn new(gpu: &Gpu) -> Result<Renderer, Error> {
+        let device = &gpu.device;
+        let layouts = Layouts::new(device);
+        let linear = Some(gpu::LINEAR_FORMAT);
+        Ok(Renderer {
+            surface: Surface::new(device, &layouts),
+            screen: Screen::new(device, &layouts),
+            maps: Maps::new(device, &layouts),
+            volumes: VolumePass::new(device, gpu::DEPTH_FORMAT, gpu::SAMPLES, linear, &layouts.view),
+            deformer: Deformer::new(device),
+            meshes: Slab::default(),
+            materials: Slab::default(),
+            material_cache: MaterialCache::new(device, &gpu.queue).map_err(Error::Device)?,
+            draws: Draws::default(),
+            lighting: Lighting::new(device),
+            views: Slots::new(device, "views"),
+            films: Slots::new(device, "films"),
+            visible: GrowBuffer::new(device, "visible", wgpu::BufferUsages::VERTEX, 1 << 12),
+            view_targets: ViewTargets::default(),
+            targets: Vec::new(),
+            problems: Problems::default(),
+            frame: 0,
+            layouts,
+            gpu: gpu.clone(),
+        })
+    }
+
+    /// Draws all pictures of a frame. What cannot be drawn is left out, with a report in [`Renderer::problems`].
+    pub fn render(&mut self, scene: &Scene, pictures: &[Picture]) -> Result<FrameStats, Error> {
+        let start = Instant::now();
+        let mut stats = FrameStats::default();
+        self.frame += 1;
+        self.views.clear();
+        self.films.clear();
+        self.take_drawables(scene);
+        let lights = Lights::new(scene);
+        self.choose_maps(scene, pictures);
+        let (jobs, purposes) = jobs::jobs(scene, &lights, &self.draws, &self.meshes, &self.deformer, &mut self.films);
+        let plans = self.plan_views(scene, pictures, &lights, &purposes, &mut stats);
+        self.upload(scene, &lights);
+        let prepared = Instant::now();
+
+        self.record(&plans, &jobs, &mut stats);
+        self.drop_unused();
+        stats.maps = self.maps.faces.len() as u32;
+        stats.volume_jobs = jobs.len() as u32;
+        stats.prepare_s = (prepared - start).as_secs_f64();
+        stats.encode_s = prepared.elapsed().as_secs_f64();
+        Ok(stats)
+    }
+
+    /// Meshes, materials and places of everything that is drawn.
+    fn take_drawables(&mut self, scene: &Scene) {
+        let (device, queue, frame) = (&self.gpu.device, &self.gpu.queue, self.frame);
+        self.draws.begin(scene.drawables.len());
+        for (index, d) in scene.drawables.iter().enumerate() {
+            if !d.visible {
+                self.draws.hide(index);
+                continue;
+            }
+            if !d.world_from_object.is_finite() {
+                self.problems.report(format!("shape '{}' has a matrix that is not finite: left out", d.name));
+                self.draws.hide(index);
+                continue;
+            }
+            let hint = self.draws.ids(index);
+            let problems = &mut self.problems;
+            let mesh = self.meshes.get_or_make(&d.mesh, hint.0, frame, || match make_mesh(device, &d.mesh) {
+                Ok(mesh) => Some(mesh),
+                Err(message) => {
+                    problems.report(message);
+                    None
+                }
+            });
+            let material = self.materials.get_or_make(&d.material, hint.1, frame, || {
+                let report = |message| problems.report(message);
+                self.material_cache.make(device, queue, &self.layouts.material, &d.material, report)
+            });
+            let deformed = match (&d.pose, self.meshes.get(mesh)) {
+                (Some(pose), Some(Some(gpu_mesh))) => {
+                    self.deformer.pose(device, index as u32, &d.mesh, gpu_mesh, pose, frame).then_some(index as u32)
+                }
+                _ => None,
+            };
+            let caches = Caches { meshes: &self.meshes, materials: &self.materials };
+            self.draws.set(index, d, (mesh, material), deformed, &caches);
+        }
+        self.draws.sort();
+    }
+
+    /// Shadow maps, fitted to all views at once.
+    fn choose_maps(&mut self, scene: &Scene, pictures: &[Picture]) {
+        let around = surroundings::of(scene, pictures, &self.draws);
+        let problems = &mut self.problems;
+        let is_new = self.maps.choose(&self.gpu.device, scene, &around, |message| problems.report(message));
+        if is_new {
+            self.lighting.forget_maps();
+        }
+        self.maps.prepare(&self.gpu.device, &mut self.views, &mut self.draws);
+    }
+
+    fn plan_views(
+        &mut self,
+        scene: &Scene,
+        pictures: &[Picture],
+        lights: &Lights,
+        purposes: &[Purpose],
+        stats: &mut FrameStats,
+    ) -> Vec<ViewPlan> {
+        let device = &self.gpu.device;
+        let limit = device.limits().max_texture_dimension_2d;
+        let frame = plan::Frame { scene, lights, purposes };
+        let mut plans = Vec::new();
+        self.targets.resize_with(pictures.len(), || None);
+        for (number, picture) in pictures.iter().enumerate() {
+            if !plan::is_drawable(picture, limit, &mut self.problems) {
+                self.targets[number] = None;
+                continue;
+            }
+            if !self.targets[number].as_ref().is_some_and(|t| t.fits(picture)) {
+                self.targets[number] = Some(Target::new(device, &self.layouts.picture, picture));
+            }
+            let (draws, views, problems) = (&mut self.draws, &mut self.views, &mut self.problems);
+            plans.extend(plan::plan_picture(number, picture, &frame, draws, views, problems, stats, limit));
+        }
+        for view in &plans {
+            self.view_targets.make(device, &self.layouts.picture, view.size, self.frame);
+            let passes = [(view.base_pass(), &view.opaque), (view.add_pass(), &view.opaque)];
+            let used = if view.steps.is_empty() { 1 } else { 2 };
+            for (pass, list) in passes.into_iter().take(used).chain([(crate::surface::Pass::Blend, &view.blended)]) {
+                for draw in list {
+                    self.surface.make(device, pass, self.draws.batches[draw.batch as usize].kind);
+                }
+            }
+        }
+        plans
+    }
+
+    /// Sends the frame's lists to the GPU.
+    fn upload(&mut self, scene: &Scene, lights: &Lights) {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        self.views.upload(device, queue, &self.layouts.view);
+        self.films.upload(device, queue, &self.layouts.film);
+        self.visible.write(device, queue, bytemuck::cast_slice(&self.draws.visible));
+        self.lighting.upload(device, queue, &self.layouts, scene, lights, &self.maps, &self.draws);
+    }
+
+    /// Records and submits: deformation, volumes, maps, views.
+    fn record(&mut self, plans: &[ViewPlan], jobs: &[VolumeJob], stats: &mut FrameStats) {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
+        stats.deformed = self.deformer.run(&mut encoder);
+        self.volumes.prepare(device, queue, &mut encoder, jobs);
+        let drawer = Drawer {
+            meshes: &self.meshes,
+            materials: &self.materials,
+            deformer: &self.deformer,
+            batches: &self.draws.batches,
+            visible: &self.visible.buffer,
+            instances: self.lighting.instances(),
+        };
+        let mut recorder = Recorder {
+            drawer: &drawer,
+            surface: &self.surface,
+            screen: &self.screen,
+            volumes: &self.volumes,
+            views: &self.views,
+            films: &self.films,
+            lighting: self.lighting.group(),
+            stats,
+        };
+        recorder.maps(&mut encoder, &self.maps);
+        let mut begun = std::collections::HashSet::new();
+        for view in plans {
+            if let (Some(from), Some(Some(to))) = (self.view_targets.get(view.size), self.targets.get(view.picture)) {
+                recorder.view(&mut encoder, view, from);
+                let is_first = begun.insert((view.picture, view.layer));
+                recorder.compose(&mut encoder, view, from, &to.layers[view.layer], is_first);
+            }
+        }
+        queue.submit([encoder.finish()]);
+    }
+
+    fn drop_unused(&mut self) {
+        self.meshes.drop_unused(self.frame);
+        self.materials.drop_unused(self.frame);
+        self.material_cache.drop_unused();
+        self.deformer.drop_unused(self.frame);
+        self.view_targets.drop_unused(self.frame);
+    }
+
+    /// The finished picture: `Rgba8Unorm` that may be seen as `Rgba8UnormSrgb`; one layer per view for
+    /// [`umbriel_scene::Layout::Layers`]. Its bytes are sRGB encoded, but for visibility pictures.
+    pub fn target(&self, picture: usize) -> Result<&wgpu::Texture, Error> {
+        self.finished(picture).map(|t| &t.texture)
+    }
+
+    /// The whole of [`Renderer::target`] seen as sRGB.
+    pub fn target_view(&self, picture: usize) -> Result<&wgpu::TextureView, Error> {
+        self.finished(picture).map(|t| &t.whole)
+    }
+
+    fn finished(&self, index: usize) -> Result<&Target, Error> {
+        let count = self.targets.len();
+        self.targets.get(index).and_then(|t| t.as_ref()).ok_or(Error::NoPicture { index, count })
+    }
+
+    /// Waits for the last frame and brings a picture back, layer by layer.
+    pub fn read_back(&self, picture: usize) -> Result<Vec<RgbaPixels>, Error> {
+        let texture = &self.finished(picture)?.texture;
+        let size = texture.size();
+        (0..size.depth_or_array_layers)
+            .map(|layer| {
+                let rgba = read_back::layer(&self.gpu.device, &self.gpu.queue, texture, layer)?;
+                Ok(RgbaPixels { width: size.width, height: size.height, rgba })
+            })
+            .collect()
+    }
+
+    /// Shows the first layer of a picture on the whole of a window's surface of the given format.
+    pub fn blit(
+        &mut self,
+        picture: usize,
+        encoder: &mut wgpu::CommandEncoder,
+        surface: &wgpu::TextureView,
+        format: wgpu::TextureFormat,
+    ) -> Result<(), Error> {
+        let pipeline = self.screen.blit(&self.gpu.device, format).clone();
+        let layer = &self.finished(picture)?.layers[0];
+        // A surface that encodes gets linear values, any other gets the bytes.
+        let group = if format.is_srgb() { &layer.group_decoding } else { &layer.group };
+        let mut pass = crate::record::begin_colour(encoder, "blit", surface, true);
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, self.views.group(0), &[]);
+        pass.set_bind_group(1, group, &[]);
+        pass.draw(0..3, 0..1);
+        Ok(())
+    }
+
+    /// What was wrong with scene, pictures or device since the last call; each message comes once.
+    pub fn problems(&mut self) -> Vec<String> {
+        if let Ok(mut reports) = self.gpu.reports.lock() {
+            reports.drain(..).for_each(|message| self.problems.report(message));
+        }
+        self.problems.drain()
+    }
+}

@@ -1,0 +1,120 @@
+//! Passes that cover the screen: background, film, composition.
+
+use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT, SAMPLES};
+use crate::layouts::Layouts;
+use crate::shaders;
+use crate::targets::{PICTURE_FORMAT, PICTURE_FORMAT_SRGB};
+use std::collections::HashMap;
+use wgpu::{ColorWrites, CompareFunction};
+
+/// Pipelines that need no vertices.
+pub(crate) struct Screen {
+    /// Where depth is still 0.
+    pub(crate) background: wgpu::RenderPipeline,
+    /// On surfaces where the stencil is not 0.
+    pub(crate) film: wgpu::RenderPipeline,
+    /// Linear picture to its place: all channels, red, green and blue.
+    pub(crate) exposed: [wgpu::RenderPipeline; 3],
+    /// Visibility to its place.
+    pub(crate) plain: [wgpu::RenderPipeline; 3],
+    compose_module: wgpu::ShaderModule,
+    compose_layout: wgpu::PipelineLayout,
+    /// Finished pictures to windows, by the window's format.
+    blits: HashMap<wgpu::TextureFormat, wgpu::RenderPipeline>,
+}
+
+/// Channels of the whole, of the left eye and of the right one.
+const MASKS: [ColorWrites; 3] = [ColorWrites::ALL, ColorWrites::RED, ColorWrites::GREEN.union(ColorWrites::BLUE)];
+
+impl Screen {
+    pub(crate) fn new(device: &wgpu::Device, layouts: &Layouts) -> Screen {
+        let layout = |label, groups: &[Option<&wgpu::BindGroupLayout>]| {
+            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(label),
+                bind_group_layouts: groups,
+                immediate_size: 0,
+            })
+        };
+        let background_layout = layout("background", &[Some(&layouts.view), None, None, Some(&layouts.lighting)]);
+        let film_layout = layout("film", &[None, Some(&layouts.film)]);
+        let compose_layout = layout("compose", &[Some(&layouts.view), Some(&layouts.picture)]);
+        let compose_module = shaders::module(device, "compose", shaders::COMPOSE);
+        let in_shadow = wgpu::StencilFaceState { compare: CompareFunction::NotEqual, ..wgpu::StencilFaceState::IGNORE };
+        let stencil = wgpu::StencilState { front: in_shadow, back: in_shadow, read_mask: 0xff, write_mask: 0 };
+        let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
+        let compose = |entry, format| {
+            MASKS.map(|mask| pipeline(device, &compose_layout, &compose_module, entry, (format, None, mask), None))
+        };
+        Screen {
+            background: pipeline(
+                device,
+                &background_layout,
+                &shaders::module(device, "background", shaders::BACKGROUND),
+                "background",
+                (LINEAR_FORMAT, None, ColorWrites::ALL),
+                Some((CompareFunction::Equal, wgpu::StencilState::default())),
+            ),
+            film: pipeline(
+                device,
+                &film_layout,
+                &shaders::module(device, "film", shaders::FILM),
+                "tint",
+                (LINEAR_FORMAT, over, ColorWrites::ALL),
+                // Depth of the film is 0, infinitely far: it passes where there is a surface.
+                Some((CompareFunction::Less, stencil)),
+            ),
+            exposed: compose("exposed", PICTURE_FORMAT_SRGB),
+            plain: compose("plain", PICTURE_FORMAT),
+            compose_module,
+            compose_layout,
+            blits: HashMap::new(),
+        }
+    }
+
+    /// The pipeline that shows finished pictures on a surface of this format.
+    pub(crate) fn blit(&mut self, device: &wgpu::Device, format: wgpu::TextureFormat) -> &wgpu::RenderPipeline {
+        self.blits.entry(format).or_insert_with(|| {
+            let target = (format, None, ColorWrites::ALL);
+            pipeline(device, &self.compose_layout, &self.compose_module, "plain", target, None)
+        })
+    }
+}
+
+fn pipeline(
+    device: &wgpu::Device,
+    layout: &wgpu::PipelineLayout,
+    module: &wgpu::ShaderModule,
+    entry: &str,
+    (format, blend, write_mask): (wgpu::TextureFormat, Option<wgpu::BlendState>, ColorWrites),
+    depth: Option<(CompareFunction, wgpu::StencilState)>,
+) -> wgpu::RenderPipeline {
+    let count = if depth.is_some() { SAMPLES } else { 1 };
+    let compilation_options = wgpu::PipelineCompilationOptions::default();
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(entry),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("fullscreen"),
+            compilation_options: compilation_options.clone(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: depth.map(|(compare, stencil)| wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(false),
+            depth_compare: Some(compare),
+            stencil,
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState { count, ..Default::default() },
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some(entry),
+            compilation_options,
+            targets: &[Some(wgpu::ColorTargetState { format, blend, write_mask })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

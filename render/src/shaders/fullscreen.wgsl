@@ -1,0 +1,11 @@
+// A triangle that covers the screen, at infinity.
+struct Fullscreen {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) ndc: vec2<f32>,
+};
+
+@vertex
+fn fullscreen(@builtin(vertex_index) index: u32) -> Fullscreen {
+    let ndc = vec2<f32>(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0);
+    return Fullscreen(vec4<f32>(ndc, 0.0, 1.0), ndc);
+}

@@ -1,0 +1,60 @@
+// How a surface looks.
+struct Texture {
+    // Columns of the linear part of the map from the mesh's coordinates to the picture's.
+    linear: vec4<f32>,
+    offset: vec2<f32>,
+    uv_set: u32,
+    present: u32,
+};
+
+struct Material {
+    base_color: vec4<f32>,
+    emissive: vec3<f32>,
+    alpha_cutoff: f32,
+    specular: vec3<f32>,
+    exponent: f32,
+    metallic: f32,
+    roughness: f32,
+    normal_scale: f32,
+    occlusion_strength: f32,
+    // Share of ambient light that is reflected.
+    ambient: f32,
+    shading: u32,
+    alpha_mode: u32,
+    textures: array<Texture, 5>,
+};
+
+const METALLIC_ROUGHNESS: u32 = 0u;
+const PHONG: u32 = 1u;
+const UNLIT: u32 = 2u;
+
+const OPAQUE: u32 = 0u;
+const MASK: u32 = 1u;
+const BLEND: u32 = 2u;
+
+@group(2) @binding(0) var<uniform> material: Material;
+@group(2) @binding(1) var base_color_texture: texture_2d<f32>;
+@group(2) @binding(2) var base_color_sampler: sampler;
+@group(2) @binding(3) var metallic_roughness_texture: texture_2d<f32>;
+@group(2) @binding(4) var metallic_roughness_sampler: sampler;
+@group(2) @binding(5) var normal_texture: texture_2d<f32>;
+@group(2) @binding(6) var normal_sampler: sampler;
+@group(2) @binding(7) var occlusion_texture: texture_2d<f32>;
+@group(2) @binding(8) var occlusion_sampler: sampler;
+@group(2) @binding(9) var emissive_texture: texture_2d<f32>;
+@group(2) @binding(10) var emissive_sampler: sampler;
+
+fn texture_place(slot: u32, uv0: vec2<f32>, uv1: vec2<f32>) -> vec2<f32> {
+    let t = material.textures[slot];
+    let uv = select(uv0, uv1, t.uv_set == 1u);
+    return t.linear.xy * uv.x + t.linear.zw * uv.y + t.offset;
+}
+
+// Linear RGBA with texture and vertex colour.
+fn base_color_at(uv0: vec2<f32>, uv1: vec2<f32>, vertex_color: vec4<f32>) -> vec4<f32> {
+    var color = material.base_color * vertex_color;
+    if material.textures[0].present != 0u {
+        color *= textureSample(base_color_texture, base_color_sampler, texture_place(0u, uv0, uv1));
+    }
+    return color;
+}

@@ -1,0 +1,55 @@
+//! Many small uniforms in one buffer, each with its own bind group.
+
+use crate::buffer::GrowBuffer;
+use bytemuck::Pod;
+use std::marker::PhantomData;
+
+/// Bytes from one uniform to the next: the greatest alignment that a device may ask for.
+const STRIDE: u64 = 256;
+
+/// Uniforms of a frame. Numbers are good until [`Slots::clear`].
+pub(crate) struct Slots<T> {
+    buffer: GrowBuffer,
+    groups: Vec<wgpu::BindGroup>,
+    bytes: Vec<u8>,
+    kind: PhantomData<T>,
+}
+
+impl<T: Pod> Slots<T> {
+    pub(crate) fn new(device: &wgpu::Device, label: &'static str) -> Slots<T> {
+        let buffer = GrowBuffer::new(device, label, wgpu::BufferUsages::UNIFORM, 16 * STRIDE);
+        Slots { buffer, groups: Vec::new(), bytes: Vec::new(), kind: PhantomData }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.bytes.clear();
+    }
+
+    pub(crate) fn push(&mut self, uniform: &T) -> usize {
+        let slot = self.bytes.len() / STRIDE as usize;
+        self.bytes.extend_from_slice(bytemuck::bytes_of(uniform));
+        self.bytes.resize((slot + 1) * STRIDE as usize, 0);
+        slot
+    }
+
+    /// Sends all of them to the GPU.
+    pub(crate) fn upload(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, layout: &wgpu::BindGroupLayout) {
+        if self.buffer.write(device, queue, &self.bytes) {
+            self.groups.clear();
+        }
+        let slots = self.bytes.len() as u64 / STRIDE;
+        for slot in self.groups.len() as u64..slots {
+            let binding = wgpu::BufferBinding {
+                buffer: &self.buffer.buffer,
+                offset: slot * STRIDE,
+                size: wgpu::BufferSize::new(size_of::<T>() as u64),
+            };
+            let entries = &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(binding) }];
+            self.groups.push(device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries }));
+        }
+    }
+
+    pub(crate) fn group(&self, slot: usize) -> &wgpu::BindGroup {
+        &self.groups[slot]
+    }
+}

@@ -1,0 +1,51 @@
+//! What a frame cost, and what was wrong with it.
+
+use std::collections::HashSet;
+
+/// Numbers of one frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameStats {
+    /// Views drawn, of all pictures.
+    pub views: u32,
+    /// Draw calls of surfaces and casters.
+    pub draws: u32,
+    /// Instances in those draws.
+    pub instances: u32,
+    /// Triangles in those draws.
+    pub triangles: u64,
+    /// Drawables that a view left out because they are outside of it, summed over views.
+    pub culled: u32,
+    /// Shadow maps of the frame.
+    pub maps: u32,
+    /// How many of them were drawn anew.
+    pub map_redraws: u32,
+    /// Meshes deformed.
+    pub deformed: u32,
+    /// Jobs of the shadow volumes: lights and groups.
+    pub volume_jobs: u32,
+    /// CPU time until everything is sent to the GPU, seconds.
+    pub prepare_s: f64,
+    /// CPU time of recording and submitting, seconds.
+    pub encode_s: f64,
+    /// GPU time of each kind of pass in an earlier frame, seconds; empty where the device has no clock.
+    pub gpu_s: Vec<(&'static str, f64)>,
+}
+
+/// Messages, each told once.
+#[derive(Default)]
+pub(crate) struct Problems {
+    told: HashSet<String>,
+    untold: Vec<String>,
+}
+
+impl Problems {
+    pub(crate) fn report(&mut self, message: String) {
+        if self.told.insert(message.clone()) {
+            self.untold.push(message);
+        }
+    }
+
+    pub(crate) fn drain(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.untold)
+    }
+}

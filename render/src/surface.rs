@@ -1,0 +1,133 @@
+//! Pipelines of surfaces.
+
+use crate::cache::VERTEX_BUFFERS;
+use crate::draws::{Alpha, Kind};
+use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT, SAMPLES};
+use crate::layouts::Layouts;
+use crate::shaders;
+use std::collections::HashMap;
+
+/// What a pass over the surfaces does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Pass {
+    /// Depth, ambient and emitted light and the lights of the surface pass.
+    Base,
+    /// Half-transparent shapes over what is there.
+    Blend,
+    /// One light where the stencil is 0.
+    Add,
+    /// Depth, and what a map lets through of one light.
+    Visibility,
+    /// The same where the stencil is 0.
+    VisibilityAdd,
+}
+
+/// Pipelines by pass and kind of drawable.
+pub(crate) struct Surface {
+    module: wgpu::ShaderModule,
+    layout: wgpu::PipelineLayout,
+    pipelines: HashMap<(Pass, Kind), wgpu::RenderPipeline>,
+}
+
+impl Surface {
+    pub(crate) fn new(device: &wgpu::Device, layouts: &Layouts) -> Surface {
+        let groups = [&layouts.view, &layouts.instances, &layouts.material, &layouts.lighting].map(Some);
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("surface"),
+            bind_group_layouts: &groups,
+            immediate_size: 0,
+        });
+        let module = shaders::module(device, "surface", shaders::SURFACE);
+        Surface { module, layout, pipelines: HashMap::new() }
+    }
+
+    /// Makes the pipeline where there is none yet.
+    pub(crate) fn make(&mut self, device: &wgpu::Device, pass: Pass, kind: Kind) {
+        let make = || pipeline(device, &self.module, &self.layout, pass, kind);
+        self.pipelines.entry((pass, kind)).or_insert_with(make);
+    }
+
+    pub(crate) fn get(&self, pass: Pass, kind: Kind) -> Option<&wgpu::RenderPipeline> {
+        self.pipelines.get(&(pass, kind))
+    }
+}
+
+/// Topology from the number in a [`Kind`].
+pub(crate) fn topology_of(number: u8) -> wgpu::PrimitiveTopology {
+    match number {
+        0 => wgpu::PrimitiveTopology::TriangleList,
+        1 => wgpu::PrimitiveTopology::LineList,
+        _ => wgpu::PrimitiveTopology::PointList,
+    }
+}
+
+fn pipeline(
+    device: &wgpu::Device,
+    module: &wgpu::ShaderModule,
+    layout: &wgpu::PipelineLayout,
+    pass: Pass,
+    kind: Kind,
+) -> wgpu::RenderPipeline {
+    let entry = match (pass, kind.alpha) {
+        (Pass::Base, Alpha::Mask) => "masked",
+        (Pass::Base, _) => "opaque",
+        (Pass::Blend, _) => "blended",
+        (Pass::Add, _) => "added",
+        (Pass::Visibility | Pass::VisibilityAdd, _) => "visibility",
+    };
+    let fills_depth = matches!(pass, Pass::Base | Pass::Visibility);
+    let adds = matches!(pass, Pass::Add | Pass::VisibilityAdd);
+    let depth_compare = if adds { wgpu::CompareFunction::Equal } else { wgpu::CompareFunction::Greater };
+    let sum = |dst_factor| wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor,
+        operation: wgpu::BlendOperation::Add,
+    };
+    let blend = match pass {
+        Pass::Base | Pass::Visibility => None,
+        Pass::Blend => Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+        Pass::Add | Pass::VisibilityAdd => {
+            Some(wgpu::BlendState { color: sum(wgpu::BlendFactor::One), alpha: sum(wgpu::BlendFactor::One) })
+        }
+    };
+    let stencil = if adds { outside_shadow() } else { wgpu::StencilState::default() };
+    let compilation_options = wgpu::PipelineCompilationOptions::default();
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(entry),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("vertex"),
+            compilation_options: compilation_options.clone(),
+            buffers: &VERTEX_BUFFERS,
+        },
+        primitive: wgpu::PrimitiveState {
+            topology: topology_of(kind.topology),
+            front_face: if kind.mirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw },
+            cull_mode: if kind.double_sided || kind.topology != 0 { None } else { Some(wgpu::Face::Back) },
+            ..Default::default()
+        },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(fills_depth),
+            depth_compare: Some(depth_compare),
+            stencil,
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState { count: SAMPLES, ..Default::default() },
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some(entry),
+            compilation_options,
+            targets: &[Some(wgpu::ColorTargetState { format: LINEAR_FORMAT, blend, write_mask: wgpu::ColorWrites::ALL })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// Passes where no volume was counted.
+fn outside_shadow() -> wgpu::StencilState {
+    let face = wgpu::StencilFaceState { compare: wgpu::CompareFunction::Equal, ..wgpu::StencilFaceState::IGNORE };
+    wgpu::StencilState { front: face, back: face, read_mask: 0xff, write_mask: 0 }
+}

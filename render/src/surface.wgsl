@@ -1,0 +1,231 @@
+// Surfaces as the eye sees them. Concatenated after shaders/{position,view,instance,material,light,brdf,shadow_map}.
+
+struct Vertex {
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) tangent: vec4<f32>,
+    @location(3) uv0: vec2<f32>,
+    @location(4) uv1: vec2<f32>,
+    @location(5) color: vec4<f32>,
+    // Place in the frame's list, from the view's list of what it sees.
+    @location(6) instance: u32,
+};
+
+struct Fragment {
+    @builtin(position) @invariant clip: vec4<f32>,
+    @location(0) p_in_world: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) tangent: vec4<f32>,
+    @location(3) uv0: vec2<f32>,
+    @location(4) uv1: vec2<f32>,
+    @location(5) color: vec4<f32>,
+    @location(6) @interpolate(flat) flags: u32,
+};
+
+@vertex
+fn vertex(v: Vertex) -> Fragment {
+    let instance = instances[v.instance];
+    let p_in_world = world_from_vertex(instance.world_from_object, v.position);
+    var f: Fragment;
+    f.clip = clip_from_point(view.clip_from_world, p_in_world);
+    f.p_in_world = p_in_world.xyz;
+    f.normal = instance.world_from_object_normal * v.normal;
+    let tangent = (instance.world_from_object * vec4<f32>(v.tangent.xyz, 0.0)).xyz;
+    f.tangent = vec4<f32>(tangent, select(v.tangent.w, -v.tangent.w, (instance.flags & MIRRORED) != 0u));
+    f.uv0 = v.uv0;
+    f.uv1 = v.uv1;
+    f.color = v.color;
+    f.flags = instance.flags;
+    return f;
+}
+
+// What all variants need to know about the place. Called in uniform control flow: it takes derivatives.
+struct Place {
+    base_color: vec4<f32>,
+    normal: vec3<f32>,
+    // Unit normal of the triangle, towards the eye.
+    face_normal: vec3<f32>,
+    towards_eye: vec3<f32>,
+    distance: f32,
+    emissive: vec3<f32>,
+    occlusion: f32,
+    metallic: f32,
+    roughness: f32,
+    // Lines and points without normals.
+    is_unlit: bool,
+    is_receiver: bool,
+};
+
+fn place(f: Fragment, front: bool) -> Place {
+    var s: Place;
+    s.base_color = base_color_at(f.uv0, f.uv1, f.color);
+    s.emissive = material.emissive;
+    if material.textures[4].present != 0u {
+        s.emissive *= textureSample(emissive_texture, emissive_sampler, texture_place(4u, f.uv0, f.uv1)).rgb;
+    }
+    s.occlusion = 1.0;
+    if material.textures[3].present != 0u {
+        let o = textureSample(occlusion_texture, occlusion_sampler, texture_place(3u, f.uv0, f.uv1)).r;
+        s.occlusion = 1.0 + material.occlusion_strength * (o - 1.0);
+    }
+    s.metallic = material.metallic;
+    s.roughness = material.roughness;
+    if material.textures[1].present != 0u {
+        let m = textureSample(metallic_roughness_texture, metallic_roughness_sampler, texture_place(1u, f.uv0, f.uv1));
+        s.metallic *= m.b;
+        s.roughness *= m.g;
+    }
+    let to_eye = view.eye_in_world.xyz - f.p_in_world;
+    s.distance = length(to_eye);
+    s.towards_eye = to_eye / max(s.distance, 1e-9);
+
+    let across = dpdx(f.p_in_world);
+    let down = dpdy(f.p_in_world);
+    let area_normal = cross(across, down);
+    let has_normal = dot(f.normal, f.normal) > 1e-12;
+    s.is_unlit = material.shading == UNLIT || !has_normal;
+    var n = f.normal * inverseSqrt(max(dot(f.normal, f.normal), 1e-24));
+    s.face_normal = n;
+    if dot(area_normal, area_normal) > 0.0 {
+        s.face_normal = normalize(area_normal);
+    }
+    if dot(s.face_normal, s.towards_eye) < 0.0 {
+        s.face_normal = -s.face_normal;
+    }
+    if material.textures[2].present != 0u {
+        n = bumped(f, n, across, down);
+    }
+    s.normal = select(-n, n, front);
+    s.is_receiver = (f.flags & RECEIVES_SHADOW) != 0u;
+    return s;
+}
+
+// Normal from the normal texture; where the mesh has no tangents they follow from the texture coordinates
+// (Mikkelsen 2020, Surface gradient-based bump mapping, section 3: the cotangent frame).
+fn bumped(f: Fragment, n: vec3<f32>, across: vec3<f32>, down: vec3<f32>) -> vec3<f32> {
+    let uv = texture_place(2u, f.uv0, f.uv1);
+    let uv_across = dpdx(uv);
+    let uv_down = dpdy(uv);
+    var m = textureSample(normal_texture, normal_sampler, uv).xyz * 2.0 - 1.0;
+    m = vec3<f32>(m.xy * material.normal_scale, m.z);
+    var t = f.tangent.xyz;
+    var b = cross(n, t) * f.tangent.w;
+    if dot(t, t) < 1e-12 {
+        let down_perpendicular = cross(down, n);
+        let across_perpendicular = cross(n, across);
+        t = down_perpendicular * uv_across.x + across_perpendicular * uv_down.x;
+        // v runs down the picture, the bitangent up.
+        b = -(down_perpendicular * uv_across.y + across_perpendicular * uv_down.y);
+        let scale = inverseSqrt(max(max(dot(t, t), dot(b, b)), 1e-30));
+        // The screen's y runs down: both derivatives together turn the frame by the sign of the triangle's area.
+        let turn = sign(dot(cross(across, down), n));
+        t *= scale * turn;
+        b *= scale * turn;
+    } else {
+        t = normalize(t);
+        b = cross(n, t) * f.tangent.w;
+    }
+    return normalize(t * m.x + b * m.y + n * m.z);
+}
+
+// Light of the view's range of lights that the place reflects towards the eye.
+fn reflected(f: Fragment, s: Place) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    let roughness = clamp(s.roughness, 0.0, 1.0);
+    let surface = Surface(s.normal, s.towards_eye, s.base_color.rgb, saturate(s.metallic), max(roughness * roughness, 0.002));
+    for (var i = 0u; i < view.light_count; i++) {
+        let light = lights[view.first_light + i];
+        let in_ = incidence(light, f.p_in_world);
+        if in_.strength <= 0.0 {
+            continue;
+        }
+        var brdf: vec3<f32>;
+        if material.shading == PHONG {
+            brdf = phong_brdf(surface, in_.towards);
+        } else {
+            brdf = metallic_roughness_brdf(surface, in_.towards);
+        }
+        var lit = 1.0;
+        if light.face_count > 0u && s.is_receiver && dot(surface.normal, in_.towards) > 0.0 {
+            lit = 1.0 - light.shadow_intensity * (1.0 - map_visibility(light, f.p_in_world, s.face_normal));
+        }
+        sum += light.color * in_.strength * lit * brdf;
+    }
+    return sum;
+}
+
+// Light that reaches the place from everywhere.
+fn ambient_light(f: Fragment, s: Place) -> vec3<f32> {
+    var sum = frame.ambient.rgb;
+    for (var i = 0u; i < frame.light_count; i++) {
+        let light = lights[i];
+        if any(light.ambient > vec3<f32>(0.0)) {
+            sum += light.ambient * incidence(light, f.p_in_world).strength;
+        }
+    }
+    return sum * material.ambient * s.occlusion * s.base_color.rgb;
+}
+
+fn base(f: Fragment, s: Place) -> vec3<f32> {
+    var color = s.emissive;
+    if s.is_unlit {
+        color += s.base_color.rgb;
+    } else {
+        color += ambient_light(f, s) + reflected(f, s);
+    }
+    return mix(color, frame.fog_color, fog_share(s.distance));
+}
+
+// Opaque surfaces: ambient and emitted light, and the view's lights.
+@fragment
+fn opaque(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    let s = place(f, front);
+    return vec4<f32>(base(f, s), 1.0);
+}
+
+// The same with holes.
+@fragment
+fn masked(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    let s = place(f, front);
+    if s.base_color.a < material.alpha_cutoff {
+        discard;
+    }
+    return vec4<f32>(base(f, s), 1.0);
+}
+
+// Mixed over what is behind: premultiplied.
+@fragment
+fn blended(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    let s = place(f, front);
+    let alpha = saturate(s.base_color.a);
+    return vec4<f32>(base(f, s) * alpha, alpha);
+}
+
+// The view's lights alone, to be added to what is there.
+@fragment
+fn added(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    let s = place(f, front);
+    if s.is_unlit || (material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff) {
+        discard;
+    }
+    return vec4<f32>(reflected(f, s) * (1.0 - fog_share(s.distance)), 0.0);
+}
+
+// Share of one light that a map lets through. Cone, distance and orientation do not count.
+@fragment
+fn visibility(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    let s = place(f, front);
+    if material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff {
+        discard;
+    }
+    // Light that is added outside of its shadow volumes starts from black.
+    if view.light_count == 0u {
+        return vec4<f32>(0.0, 0.0, 0.0, 1.0);
+    }
+    let light = lights[view.shown_light];
+    var lit = 1.0;
+    if light.face_count > 0u && s.is_receiver {
+        lit = map_visibility(light, f.p_in_world, s.face_normal);
+    }
+    return vec4<f32>(vec3<f32>(lit), 1.0);
+}

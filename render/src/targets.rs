@@ -1,0 +1,134 @@
+//! Textures that pictures are made in.
+
+use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT, SAMPLES};
+use std::collections::HashMap;
+use umbriel_scene::{Layout, Picture};
+
+/// Finished pictures: 8 bit, as they are shown or saved.
+pub(crate) const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+/// The same bytes seen as sRGB.
+pub(crate) const PICTURE_FORMAT_SRGB: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
+
+/// A finished picture.
+pub(crate) struct Target {
+    pub(crate) texture: wgpu::Texture,
+    /// All layers, for whoever shows it: writes and reads are sRGB encoded.
+    pub(crate) whole: wgpu::TextureView,
+    /// Each layer: encoding, and bytes as they are.
+    pub(crate) layers: Vec<Layer>,
+}
+
+/// One layer of a finished picture.
+pub(crate) struct Layer {
+    pub(crate) encoding: wgpu::TextureView,
+    pub(crate) plain: wgpu::TextureView,
+    /// Group 1 of a pass that shows it byte by byte.
+    pub(crate) group: wgpu::BindGroup,
+    /// The same, decoded.
+    pub(crate) group_decoding: wgpu::BindGroup,
+}
+
+impl Target {
+    pub(crate) fn new(device: &wgpu::Device, picture_layout: &wgpu::BindGroupLayout, picture: &Picture) -> Target {
+        let count = layer_count(picture);
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("target"),
+            size: wgpu::Extent3d { width: picture.size[0], height: picture.size[1], depth_or_array_layers: count },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: PICTURE_FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[PICTURE_FORMAT_SRGB],
+        });
+        let layers = (0..count).map(|layer| {
+            let view = |format| {
+                texture.create_view(&wgpu::TextureViewDescriptor {
+                    format: Some(format),
+                    dimension: Some(wgpu::TextureViewDimension::D2),
+                    base_array_layer: layer,
+                    array_layer_count: Some(1),
+                    ..Default::default()
+                })
+            };
+            let (encoding, plain) = (view(PICTURE_FORMAT_SRGB), view(PICTURE_FORMAT));
+            let group = picture_group(device, picture_layout, &plain);
+            let group_decoding = picture_group(device, picture_layout, &encoding);
+            Layer { encoding, plain, group, group_decoding }
+        });
+        let layers = layers.collect();
+        let format = Some(PICTURE_FORMAT_SRGB);
+        let whole = texture.create_view(&wgpu::TextureViewDescriptor { format, ..Default::default() });
+        Target { texture, whole, layers }
+    }
+
+    /// Can it hold this picture?
+    pub(crate) fn fits(&self, picture: &Picture) -> bool {
+        let size = self.texture.size();
+        [size.width, size.height] == picture.size && size.depth_or_array_layers == layer_count(picture)
+    }
+}
+
+fn layer_count(picture: &Picture) -> u32 {
+    if picture.layout == Layout::Layers { picture.views.len().max(1) as u32 } else { 1 }
+}
+
+/// Bind group of a pass that reads one picture.
+pub(crate) fn picture_group(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, view: &wgpu::TextureView) -> wgpu::BindGroup {
+    let resource = wgpu::BindingResource::TextureView(view);
+    let entries = &[wgpu::BindGroupEntry { binding: 0, resource }];
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("picture"), layout, entries })
+}
+
+/// What a view is drawn in, shared by all views of its size.
+pub(crate) struct ViewTarget {
+    pub(crate) samples: wgpu::TextureView,
+    pub(crate) resolved: wgpu::TextureView,
+    pub(crate) depth: wgpu::TextureView,
+    /// Group 1 of the pass that reads `resolved`.
+    pub(crate) group: wgpu::BindGroup,
+    last_used: u64,
+}
+
+/// View targets by size.
+#[derive(Default)]
+pub(crate) struct ViewTargets(HashMap<[u32; 2], ViewTarget>);
+
+impl ViewTargets {
+    pub(crate) fn make(&mut self, device: &wgpu::Device, picture_layout: &wgpu::BindGroupLayout, size: [u32; 2], frame: u64) {
+        let target = self.0.entry(size).or_insert_with(|| {
+            let view = |label, format, sample_count, usage| {
+                let texture = device.create_texture(&wgpu::TextureDescriptor {
+                    label: Some(label),
+                    size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+                    mip_level_count: 1,
+                    sample_count,
+                    dimension: wgpu::TextureDimension::D2,
+                    format,
+                    usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
+                    view_formats: &[],
+                });
+                texture.create_view(&wgpu::TextureViewDescriptor::default())
+            };
+            let none = wgpu::TextureUsages::empty();
+            let resolved = view("resolved", LINEAR_FORMAT, 1, wgpu::TextureUsages::TEXTURE_BINDING);
+            ViewTarget {
+                samples: view("samples", LINEAR_FORMAT, SAMPLES, none),
+                group: picture_group(device, picture_layout, &resolved),
+                resolved,
+                depth: view("depth", DEPTH_FORMAT, SAMPLES, none),
+                last_used: frame,
+            }
+        });
+        target.last_used = frame;
+    }
+
+    pub(crate) fn get(&self, size: [u32; 2]) -> Option<&ViewTarget> {
+        self.0.get(&size)
+    }
+
+    /// Drops sizes that were not used for a while.
+    pub(crate) fn drop_unused(&mut self, frame: u64) {
+        self.0.retain(|_, target| target.last_used + 30 > frame);
+    }
+}

@@ -1,0 +1,125 @@
+//! What the shaders read, as Rust structs. A test compares their layouts with the WGSL.
+
+use bytemuck::{Pod, Zeroable};
+
+/// `View` of shaders/view.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct View {
+    pub(crate) clip_from_world: [[f32; 4]; 4],
+    pub(crate) world_from_clip: [[f32; 4]; 4],
+    pub(crate) view_from_world: [[f32; 4]; 4],
+    pub(crate) eye_in_world: [f32; 4],
+    pub(crate) viewport: [f32; 4],
+    pub(crate) first_light: u32,
+    pub(crate) light_count: u32,
+    pub(crate) exposure: f32,
+    pub(crate) shown_light: u32,
+}
+
+/// `Instance` of shaders/instance.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(crate) struct Instance {
+    pub(crate) world_from_object: [[f32; 4]; 4],
+    pub(crate) world_from_object_normal: [[f32; 4]; 3],
+    pub(crate) flags: u32,
+    pub(crate) spare: [u32; 3],
+}
+
+impl Instance {
+    /// Shadows fall on it.
+    pub(crate) const RECEIVES_SHADOW: u32 = 1;
+    /// Its matrix mirrors.
+    pub(crate) const MIRRORED: u32 = 2;
+}
+
+/// `Material` of shaders/material.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct Material {
+    pub(crate) base_color: [f32; 4],
+    pub(crate) emissive: [f32; 3],
+    pub(crate) alpha_cutoff: f32,
+    pub(crate) specular: [f32; 3],
+    pub(crate) exponent: f32,
+    pub(crate) metallic: f32,
+    pub(crate) roughness: f32,
+    pub(crate) normal_scale: f32,
+    pub(crate) occlusion_strength: f32,
+    pub(crate) ambient: f32,
+    pub(crate) shading: u32,
+    pub(crate) alpha_mode: u32,
+    pub(crate) spare: u32,
+    pub(crate) textures: [Texture; 5],
+}
+
+/// `Texture` of shaders/material.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct Texture {
+    /// Columns of the linear part of `uv_from_mesh`.
+    pub(crate) linear: [f32; 4],
+    pub(crate) offset: [f32; 2],
+    pub(crate) uv_set: u32,
+    pub(crate) present: u32,
+}
+
+/// `Light` of shaders/light.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct Light {
+    pub(crate) position: [f32; 3],
+    pub(crate) kind: u32,
+    pub(crate) direction: [f32; 3],
+    pub(crate) range: f32,
+    pub(crate) color: [f32; 3],
+    pub(crate) shadow_intensity: f32,
+    pub(crate) ambient: [f32; 3],
+    pub(crate) cos_outer: f32,
+    pub(crate) attenuation: [f32; 3],
+    pub(crate) cone_scale: f32,
+    pub(crate) first_face: u32,
+    pub(crate) face_count: u32,
+    pub(crate) filter_width: f32,
+    pub(crate) slope_bias: f32,
+    pub(crate) constant_bias: f32,
+    pub(crate) spare: [u32; 3],
+}
+
+/// `MapFace` of shaders/shadow_map.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct MapFace {
+    pub(crate) map_from_world: [[f32; 4]; 4],
+    pub(crate) world_from_map: [[f32; 4]; 4],
+    /// Left, top of the tile in its layer; side, texels; layer.
+    pub(crate) tile: [u32; 4],
+    /// Towards the light (w = 0) or its position (w = 1).
+    pub(crate) light: [f32; 4],
+    /// Size of a texel at distance 1 (perspective) or everywhere (parallel), metres.
+    pub(crate) texel: f32,
+    pub(crate) spare: [f32; 3],
+}
+
+/// `Frame` of shaders/light.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct Frame {
+    pub(crate) ambient: [f32; 4],
+    pub(crate) zenith: [f32; 4],
+    pub(crate) horizon: [f32; 4],
+    pub(crate) nadir: [f32; 4],
+    pub(crate) fog_color: [f32; 3],
+    pub(crate) fog_range: f32,
+    pub(crate) fog_kind: u32,
+    pub(crate) light_count: u32,
+    pub(crate) spare: [u32; 2],
+}
+
+/// `Film` of film.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct Film {
+    pub(crate) color: [f32; 4],
+}
