@@ -7,5 +7,9 @@
 //! What it does not know: GPUs and how anything is drawn, scripts, sockets, windows, devices. Its result is a plain
 //! [`umbriel_scene::Scene`].
 
-#[allow(dead_code)]
+pub mod extract;
 pub mod geometry;
+pub mod nodes;
+
+pub use extract::{ExtractStats, Extractor, Problem, Viewpoint};
+pub use nodes::{WORLD, new_graph, node_types};

@@ -1,0 +1,159 @@
+//! Light nodes become lights in the room.
+
+use super::problem::Problems;
+use super::read::{Reader, label};
+use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
+use std::f32::consts::PI;
+use umbriel_fields::{Graph, NodeId};
+use umbriel_scene::{Light, LightKind, MapFilter, MapSettings, ShadowMethod};
+
+/// One place of a light in the world.
+pub(super) struct LightEntry {
+    /// In the space of its node; None if it is off.
+    pub(super) local: Option<Light>,
+    /// In the room; None if it is off, hidden, or nowhere.
+    pub(super) placed: Option<Light>,
+    /// Place in the scene's list.
+    pub(super) slot: Option<usize>,
+}
+
+/// Widest cone, so that its cosine still differs from that of pi.
+const WIDEST_RAD: f32 = PI - 1e-3;
+
+/// Reads a light node in its own space. None if it is off.
+pub(super) fn read_light(graph: &Graph, node: NodeId, problems: &mut Problems) -> Option<Light> {
+    let read = Reader::new(graph, node);
+    if !read.get::<bool>("on") {
+        return None;
+    }
+    let mut check = Check { graph, node, problems };
+    let mut light = Light {
+        name: label(graph, node),
+        color: check.finite("color", read.color("color"), Vec3::ONE, |c| c.is_finite()),
+        ambient_intensity: check.finite("ambient_intensity", read.get("ambient_intensity"), 0.0, |x: &f32| x.is_finite()),
+        shadows: shadows(&read),
+        shadow_intensity: check.finite("shadow_intensity", read.get("shadow_intensity"), 1.0, |x: &f32| x.is_finite()),
+        ..Light::default()
+    };
+    match &*graph.type_of(node).name {
+        "DirectionalLight" => light.direction = read.get("direction"),
+        "PointLight" => {
+            light.kind = LightKind::Point;
+            light.position = read.get("location");
+        }
+        "LightSource" => light_source(&read, &mut light),
+        _ => {
+            let outer_rad = read.get::<f32>("cut_off_angle");
+            light.kind = cone(outer_rad, read.get::<f32>("beam_width"));
+            light.position = read.get("location");
+            light.direction = read.get("direction");
+        }
+    }
+    light.position = check.finite("position", light.position, Vec3::ZERO, |p| p.is_finite());
+    light.direction = check.finite("direction", light.direction, Vec3::NEG_Z, |d| d.try_normalize().is_some());
+    let parallel = light.kind == LightKind::Directional;
+    let usual = if parallel { PI } else { 100.0 };
+    light.intensity = check.finite("intensity", read.get("intensity"), usual, |x: &f32| x.is_finite() && *x >= 0.0);
+    if !parallel {
+        let reach = |x: &f32| !x.is_nan() && *x > 0.0;
+        light.range = check.finite("radius", read.get("radius"), f32::INFINITY, reach);
+        let fine = |a: &Vec3| a.is_finite() && a.min_element() >= 0.0 && a.max_element() > 0.0;
+        light.attenuation = check.finite("attenuation", read.get("attenuation"), Vec3::Z, fine);
+    }
+    light.map = map_settings(&read, parallel, &mut check);
+    Some(light)
+}
+
+/// The light of Performer (000 section 4.1): the position's w tells its kind.
+fn light_source(read: &Reader<'_>, light: &mut Light) {
+    let position: Vec4 = read.get("position");
+    if position.w == 0.0 {
+        // The position of a parallel light is where it comes from.
+        light.direction = -position.truncate();
+        return;
+    }
+    light.position = position.truncate() / position.w;
+    light.direction = read.get("spot_dir");
+    let Vec2 { x: exponent, y: spread_deg } = read.get("spot_cone");
+    // Without a cone it is still no PointLight: its shadow map looks along `spot_dir`, as in Performer.
+    let outer_rad = spread_deg.to_radians();
+    let inner_rad = if exponent > 0.0 { 0.95f32.powf(1.0 / exponent).acos() } else { outer_rad };
+    light.kind = cone(outer_rad, inner_rad);
+}
+
+fn cone(outer_rad: f32, inner_rad: f32) -> LightKind {
+    let outer_rad = outer_rad.clamp(1e-3, WIDEST_RAD);
+    LightKind::Spot { inner_rad: inner_rad.clamp(0.0, outer_rad * 0.999), outer_rad }
+}
+
+fn shadows(read: &Reader<'_>) -> ShadowMethod {
+    match read.choice("shadows") {
+        1 => ShadowMethod::Map,
+        2 => ShadowMethod::Volume,
+        _ if read.get::<bool>("shadow_enable") => ShadowMethod::Map,
+        _ => ShadowMethod::None,
+    }
+}
+
+/// Zero means fitted; anything that makes no frustum is reported and fitted.
+fn map_settings(read: &Reader<'_>, parallel: bool, check: &mut Check<'_>) -> MapSettings {
+    let size: i32 = check.finite("shadow_size", read.get("shadow_size"), 2048, |s: &i32| *s > 0);
+    let frustum: Vec4 = read.get("shadow_frustum");
+    let window = |f: &Vec4| f.is_finite() && f.x < f.y && f.z < f.w || *f == Vec4::ZERO;
+    let frustum = check.finite("shadow_frustum", frustum, Vec4::ZERO, window);
+    let near_far: Vec2 = read.get("shadow_near_far");
+    let span = |d: &Vec2| d.is_finite() && d.x < d.y && (parallel || d.x > 0.0) || *d == Vec2::ZERO;
+    let near_far = check.finite("shadow_near_far", near_far, Vec2::ZERO, span);
+    let mut bias = |field: &'static str| {
+        let value = check.finite(field, read.get(field), -1.0, |x: &f32| x.is_finite());
+        (value >= 0.0).then_some(value)
+    };
+    MapSettings {
+        slope_bias: bias("displace_scale"),
+        constant_bias: bias("displace_offset"),
+        size: size as u32,
+        frustum: (frustum != Vec4::ZERO).then(|| frustum.to_array()),
+        near_far: (near_far != Vec2::ZERO).then(|| near_far.to_array()),
+        filter: [MapFilter::None, MapFilter::Hardware, MapFilter::Pcf4, MapFilter::Pcf16][read.choice("filter").min(3) as usize],
+    }
+}
+
+/// Reports values that make no sense and gives the usual one instead.
+struct Check<'a> {
+    graph: &'a Graph,
+    node: NodeId,
+    problems: &'a mut Problems,
+}
+
+impl Check<'_> {
+    fn finite<T: std::fmt::Debug + Copy>(&mut self, field: &'static str, value: T, usual: T, fine: impl Fn(&T) -> bool) -> T {
+        let is_fine = fine(&value);
+        let problem = (!is_fine).then(|| format!("{value:?} makes no sense here; {usual:?} is used"));
+        self.problems.set(self.graph, self.node, field, problem);
+        if is_fine { value } else { usual }
+    }
+}
+
+/// The light in the room. `world_per_room` is the Navigation's scale. None where its place or direction is not finite.
+pub(super) fn place_light(local: &Light, room_from_local: &Mat4, world_per_room: f32) -> Option<Light> {
+    let stretch = Mat3::from_mat4(*room_from_local).determinant().abs().cbrt();
+    let mut light = local.clone();
+    light.position = room_from_local.transform_point3(local.position);
+    light.direction = match local.kind {
+        LightKind::Point => Vec3::NEG_Z,
+        _ => room_from_local.transform_vector3(local.direction).try_normalize()?,
+    };
+    if !light.position.is_finite() || stretch == 0.0 {
+        return None;
+    }
+    light.range *= stretch;
+    // A world seen ten times smaller is as bright: distances count in metres of the world.
+    light.attenuation *= Vec3::new(1.0, world_per_room, world_per_room * world_per_room);
+    let scaled = |v: f32| v * stretch;
+    light.map.near_far = local.map.near_far.map(|d| d.map(scaled));
+    light.map.constant_bias = local.map.constant_bias.map(scaled);
+    if local.kind == LightKind::Directional {
+        light.map.frustum = local.map.frustum.map(|f| f.map(scaled));
+    }
+    Some(light)
+}

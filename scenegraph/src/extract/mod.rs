@@ -1,0 +1,377 @@
+//! Keeps a flat scene up to date from the revisions of the graph.
+//!
+//! The graph is compiled into one list: an entry for every path from the world to a node, parents before children, each
+//! sub-tree one contiguous run. A changed transform recomputes its run; a changed resource rewrites its shapes; only
+//! changed `children` compile the list anew. Everything is extracted in ROOM space: the displays stand still and the
+//! world moves (000 section 4.1), lights included.
+
+mod dirty;
+mod drawable;
+mod instance;
+mod light;
+mod material;
+mod mesh;
+mod problem;
+mod read;
+mod role;
+mod room;
+mod shape;
+mod skin;
+mod stencil;
+mod sweep;
+mod texture;
+
+#[cfg(test)]
+mod tests;
+
+pub use problem::Problem;
+pub use room::Viewpoint;
+
+use dirty::Dirty;
+use drawable::Slots;
+use glam::Vec3;
+use instance::{Instances, compile, local_matrix, switch_choice};
+use light::{LightEntry, place_light, read_light};
+use material::Materials;
+use mesh::Meshes;
+use problem::Problems;
+use role::{Role, Types};
+use room::{Globals, Room, read_environment, read_head, read_room, read_viewpoints};
+use shape::{Resources, Shapes};
+use skin::Bindings;
+use slotmap::SecondaryMap;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use sweep::{Touched, lod_choice, sweep};
+use texture::Pictures;
+use umbriel_fields::{Graph, NodeId, Revision};
+use umbriel_scene::{Scene, StencilGroup};
+
+/// Most places in the world, so that nodes which share children cannot multiply without end.
+const MAX_PLACES: usize = 1_000_000;
+
+/// What an update did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ExtractStats {
+    /// Places visited and nodes read anew.
+    pub nodes_touched: usize,
+    /// Drawables written.
+    pub drawables_changed: usize,
+    /// Lights written.
+    pub lights_changed: usize,
+    /// The list was compiled anew, because branches of the tree changed.
+    pub rebuilt: bool,
+}
+
+/// Follows one graph and keeps one scene.
+pub struct Extractor {
+    last: Option<Revision>,
+    limit: usize,
+    types: Types,
+    /// Every living node and the place of its type.
+    known: SecondaryMap<NodeId, u16>,
+    globals: Globals,
+    world: Option<NodeId>,
+    room: Room,
+    head: Vec3,
+    instances: Instances,
+    shapes: Shapes,
+    bindings: Bindings,
+    slots: Slots,
+    lights: Vec<LightEntry>,
+    lods: Vec<u32>,
+    groups: Vec<u32>,
+    viewpoint_places: Vec<u32>,
+    viewpoints: Vec<Viewpoint>,
+    resources: Resources,
+}
+
+impl Default for Extractor {
+    fn default() -> Extractor {
+        Extractor::new()
+    }
+}
+
+impl Extractor {
+    /// An extractor whose pictures lie below the current folder.
+    pub fn new() -> Extractor {
+        let resources = Resources {
+            meshes: Meshes::default(),
+            materials: Materials::new(),
+            pictures: Pictures::new(PathBuf::from(".")),
+            problems: Problems::default(),
+        };
+        Extractor {
+            last: None,
+            limit: MAX_PLACES,
+            types: Types::default(),
+            known: SecondaryMap::new(),
+            globals: Globals::default(),
+            world: None,
+            room: Room::default(),
+            head: Vec3::ZERO,
+            instances: Instances::default(),
+            shapes: Shapes::default(),
+            bindings: Bindings::default(),
+            slots: Slots::default(),
+            lights: Vec::new(),
+            lods: Vec::new(),
+            groups: Vec::new(),
+            viewpoint_places: Vec::new(),
+            viewpoints: Vec::new(),
+            resources,
+        }
+    }
+
+    /// Pictures that `ImageTexture.url` names lie below this folder; no other file is read.
+    pub fn with_asset_root(mut self, folder: impl Into<PathBuf>) -> Extractor {
+        self.resources.pictures.asset_root = folder.into();
+        self
+    }
+
+    /// At most so many places in the world; a graph of shared nodes may have more paths than memory. 1 000 000 at first.
+    pub fn with_place_limit(mut self, places: usize) -> Extractor {
+        self.limit = places;
+        self
+    }
+
+    /// Brings the scene up to date with all writes to the graph since the last update. Call it after `evaluate`, always
+    /// with the same graph and the same scene.
+    pub fn update(&mut self, graph: &Graph, scene: &mut Scene) -> ExtractStats {
+        let mut dirty = self.gather(graph);
+        if scene.drawables.len() != self.slots.places.len() {
+            dirty.everything();
+        }
+        if dirty.is_empty() {
+            return ExtractStats::default();
+        }
+        let mut stats = ExtractStats { rebuilt: dirty.structure, ..ExtractStats::default() };
+        self.update_room(graph, &mut dirty);
+        if dirty.structure {
+            self.recompile(graph, scene, &mut dirty);
+        }
+        self.refresh_shapes(graph, &mut dirty, &mut stats);
+        let touched = self.move_places(graph, &mut dirty, &mut stats);
+        let casting = self.write_drawables(scene, touched.shapes, &mut stats);
+        let relisted = self.update_lights(graph, scene, &dirty, &touched.lights, &mut stats);
+        if dirty.structure || dirty.stencils || touched.groups || relisted || casting {
+            scene.stencil_groups = self.stencil_groups(graph, scene);
+        }
+        if touched.viewpoints || dirty.viewpoints {
+            self.viewpoints = read_viewpoints(graph, &self.instances, &self.viewpoint_places, &self.room);
+        }
+        if dirty.environment {
+            read_environment(graph, &self.globals, &self.room, &mut self.resources.problems, scene);
+        }
+        stats
+    }
+
+    /// Problems found since this was last called, each once until it is mended and comes back.
+    pub fn problems(&mut self) -> Vec<Problem> {
+        self.resources.problems.drain()
+    }
+
+    /// The place of a light node in [`Scene::lights`]; None if it is off, hidden or no light of the world.
+    pub fn light_of(&self, node: NodeId) -> Option<usize> {
+        self.instances.of(node).find_map(|place| self.lights.get(self.instances.at(place).slot as usize)?.slot)
+    }
+
+    /// The places in [`Scene::drawables`] of all shapes at and below a node, in tree order.
+    pub fn drawables_of(&self, node: NodeId) -> Vec<usize> {
+        let below = |place: u32| &self.instances.list[place as usize..self.instances.at(place).end as usize];
+        let shapes = self.instances.of(node).flat_map(below).filter(|i| i.role == Role::Shape);
+        shapes.map(|i| i.slot as usize).collect()
+    }
+
+    /// The shape that is shown in a place of [`Scene::drawables`].
+    pub fn node_of_drawable(&self, drawable: usize) -> Option<NodeId> {
+        let place = self.slots.places.get(drawable)?;
+        self.instances.list.get(*place as usize).map(|i| i.node)
+    }
+
+    /// Everything to see the world from, in tree order.
+    pub fn viewpoints(&self) -> &[Viewpoint] {
+        &self.viewpoints
+    }
+
+    /// Where the room is in the world (the Navigation's pose and scale).
+    pub fn world_from_room(&self) -> glam::Mat4 {
+        self.room.world_from_room
+    }
+
+    fn update_room(&mut self, graph: &Graph, dirty: &mut Dirty) {
+        if dirty.room {
+            let room = read_room(graph, &self.globals, &mut self.resources.problems);
+            if room != self.room {
+                self.room = room;
+                dirty.places.extend((!self.instances.list.is_empty()).then_some(0));
+                dirty.environment = true;
+            }
+        }
+        if dirty.head {
+            self.head = read_head(graph, &self.globals);
+        }
+    }
+
+    /// Compiles the list anew. Shapes that stay keep their places, meshes and materials.
+    fn recompile(&mut self, graph: &Graph, scene: &mut Scene, dirty: &mut Dirty) {
+        let (instances, found) = compile(graph, &mut self.types, self.world, self.limit);
+        self.instances = instances;
+        let problems = &mut self.resources.problems;
+        problems.sweep(graph);
+        problems.replace_all(graph, "children", found.cycles);
+        problems.replace_all(graph, "places", found.limit);
+        let given_up = self.slots.assign(&mut self.instances);
+        self.slots.fit(scene);
+        for slot in given_up {
+            self.slots.vacate(scene, slot);
+        }
+        let instances = &self.instances;
+        self.shapes.retain(|shape| instances.first.contains_key(shape));
+        let unread = instances.list.iter().filter(|i| i.role == Role::Shape && !self.shapes.states.contains_key(i.node));
+        dirty.shapes.extend(unread.map(|i| i.node));
+        self.list_leaves();
+        dirty.everything_stands();
+        self.resources.meshes.sweep(graph);
+        self.resources.materials.sweep(graph);
+        self.resources.pictures.sweep();
+    }
+
+    /// Lists lights, LODs, groups and viewpoints of a newly compiled list.
+    fn list_leaves(&mut self) {
+        for list in [&mut self.lods, &mut self.groups, &mut self.viewpoint_places] {
+            list.clear();
+        }
+        self.lights.clear();
+        for (place, instance) in (0u32..).zip(&mut self.instances.list) {
+            match instance.role {
+                Role::Lod => self.lods.push(place),
+                Role::Stencil => self.groups.push(place),
+                Role::Viewpoint => self.viewpoint_places.push(place),
+                Role::Light => {
+                    instance.slot = self.lights.len() as u32;
+                    self.lights.push(LightEntry { local: None, placed: None, slot: None });
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Reads changed shapes anew, and finds joints again where skins changed.
+    fn refresh_shapes(&mut self, graph: &Graph, dirty: &mut Dirty, stats: &mut ExtractStats) {
+        let mut rebind = dirty.structure;
+        for shape in std::mem::take(&mut dirty.shapes) {
+            if !self.instances.first.contains_key(shape) || !graph.contains(shape) {
+                continue;
+            }
+            stats.nodes_touched += 1;
+            rebind |= self.shapes.refresh(graph, shape, &mut self.resources);
+            dirty.shown.extend(self.instances.of(shape));
+        }
+        if rebind {
+            let mut skinned: Vec<(u32, &skin::Skin)> = Vec::new();
+            for (node, state) in &self.shapes.states {
+                if let Some(skin) = &state.skin {
+                    skinned.extend(self.instances.of(node).map(|place| (place, skin)));
+                }
+            }
+            skinned.sort_by_key(|(place, _)| *place);
+            self.bindings.bind(&mut self.instances, skinned.into_iter());
+        }
+    }
+
+    /// Moves and shows everything below changed places. Returns the leaves it passed.
+    fn move_places(&mut self, graph: &Graph, dirty: &mut Dirty, stats: &mut ExtractStats) -> Touched {
+        for node in std::mem::take(&mut dirty.moved) {
+            let Some(info) = self.known.get(node).map(|t| self.types.get(*t)) else { continue };
+            let local = info.transform.map(|keys| local_matrix(graph, node, keys));
+            let choice = (info.role == Role::Switch).then(|| switch_choice(graph, node));
+            let places: Vec<u32> = self.instances.of(node).collect();
+            for place in places {
+                let instance = &mut self.instances.list[place as usize];
+                instance.parent_from_local = local.unwrap_or(instance.parent_from_local);
+                instance.choice = choice.unwrap_or(instance.choice);
+                dirty.places.insert(place);
+            }
+        }
+        let mut touched = Touched::default();
+        let Extractor { instances, resources: Resources { problems, .. }, .. } = self;
+        let everything: BTreeSet<u32> = (!instances.list.is_empty()).then_some(0).into_iter().collect();
+        let places = if dirty.structure { &everything } else { &dirty.places };
+        sweep(graph, instances, places, self.room.room_from_world, self.head, problems, &mut touched);
+        if dirty.head {
+            let chosen = |at: &&u32| lod_choice(graph, instances, **at, self.head) != instances.at(**at).choice;
+            let switched: BTreeSet<u32> = self.lods.iter().filter(chosen).copied().collect();
+            sweep(graph, instances, &switched, self.room.room_from_world, self.head, problems, &mut touched);
+        }
+        for joint in std::mem::take(&mut touched.joints) {
+            touched.shapes.extend(self.bindings.users(joint));
+        }
+        stats.nodes_touched += touched.visited;
+        touched.shapes.append(&mut dirty.shown);
+        touched.shapes.sort_unstable();
+        touched.shapes.dedup();
+        touched
+    }
+
+    /// Writes drawables. True if some cast that did not before, or the other way round.
+    fn write_drawables(&mut self, scene: &mut Scene, places: Vec<u32>, stats: &mut ExtractStats) -> bool {
+        let mut casting = false;
+        for place in places {
+            let written = self.slots.write(scene, &self.instances, place, &self.shapes, &self.bindings);
+            stats.drawables_changed += usize::from(written.changed);
+            casting |= written.casting;
+        }
+        casting
+    }
+
+    /// Reads and places changed lights. True if the list has other lights now.
+    fn update_lights(
+        &mut self,
+        graph: &Graph,
+        scene: &mut Scene,
+        dirty: &Dirty,
+        moved: &BTreeSet<u32>,
+        stats: &mut ExtractStats,
+    ) -> bool {
+        let mut places = moved.clone();
+        for node in &dirty.lights {
+            places.extend(self.instances.of(*node));
+        }
+        let mut relist = dirty.structure;
+        for place in places {
+            let instance = self.instances.at(place);
+            let entry = &mut self.lights[instance.slot as usize];
+            if dirty.structure || dirty.lights.contains(&instance.node) {
+                entry.local = read_light(graph, instance.node, &mut self.resources.problems);
+            }
+            let lit = entry.local.as_ref().filter(|_| instance.shown && instance.finite);
+            entry.placed = lit.and_then(|l| place_light(l, &instance.room_from_local, self.room.world_per_room));
+            stats.nodes_touched += 1;
+            match (&entry.placed, entry.slot) {
+                (Some(light), Some(slot)) if !relist && scene.lights[slot] == *light => {}
+                (Some(light), Some(slot)) if !relist => {
+                    scene.lights[slot] = light.clone();
+                    stats.lights_changed += 1;
+                }
+                (None, None) => {}
+                _ => relist = true,
+            }
+        }
+        if relist {
+            scene.lights.clear();
+            for entry in &mut self.lights {
+                entry.slot = entry.placed.is_some().then_some(scene.lights.len());
+                scene.lights.extend(entry.placed.clone());
+            }
+            stats.lights_changed += scene.lights.len();
+        }
+        relist
+    }
+
+    fn stencil_groups(&mut self, graph: &Graph, scene: &Scene) -> Vec<StencilGroup> {
+        let Extractor { instances, groups, lights, resources, .. } = self;
+        let light_of = |node| instances.of(node).find_map(|place| lights.get(instances.at(place).slot as usize)?.slot);
+        stencil::read_groups(graph, instances, groups, scene, light_of, &mut resources.problems)
+    }
+}

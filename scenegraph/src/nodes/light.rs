@@ -1,0 +1,85 @@
+//! Light sources.
+
+use glam::{Vec2, Vec3, Vec4};
+use std::f32::consts::PI;
+use umbriel_fields::{Color, Field, NodeType};
+
+/// What every light has. `intensity` in lux or candela.
+fn common(intensity: f32, unit: &'static str) -> Vec<Field> {
+    let auto = "0: fitted to what is seen.";
+    vec![
+        Field::new("on", true).doc("Shines."),
+        Field::new("color", Color(Vec3::ONE)).alias("diffuse").doc("Linear RGB."),
+        Field::new("intensity", intensity)
+            .unit(unit)
+            .doc("Brightness; a white surface that a directional light of pi meets at right angles is 1."),
+        Field::new("ambient_intensity", 0.0f32).doc("Share of the light that reaches everything in reach, shadowed or not."),
+        Field::choice("shadows", &["none", "map", "volume"], "none").doc("How it casts shadows; true is map."),
+        Field::new("shadow_enable", false).doc("Casts shadows by a map, where `shadows` is none (000 section 4.1)."),
+        Field::new("shadow_intensity", 1.0f32).range(0.0, 1.0).doc("Share of the light that a shadow takes away."),
+        Field::new("shadow_size", 2048i32).unit("texels").doc("Side of the shadow map."),
+        Field::new("shadow_frustum", Vec4::ZERO)
+            .alias("shadow_frust")
+            .doc(format!("Left, right, bottom, top of the map: at distance 1, or in metres for parallel light. {auto}")),
+        Field::new("shadow_near_far", Vec2::ZERO).unit("m").doc(format!("Nearest and farthest distance of the map. {auto}")),
+        Field::new("displace_scale", -1.0f32)
+            .unit("texels")
+            .alias("shadow_displace_scale")
+            .doc("Bias by slope; negative: tunes itself."),
+        Field::new("displace_offset", -1.0f32)
+            .unit("m")
+            .alias("shadow_displace_offset")
+            .doc("Constant bias; negative: tunes itself."),
+        Field::choice("filter", &["none", "hardware", "pcf4", "pcf16"], "pcf16").doc("How the map is looked up."),
+    ]
+}
+
+fn place(name: &'static str) -> Field {
+    Field::new(name, Vec3::ZERO).unit("m").doc("Where it is.")
+}
+
+fn direction() -> Field {
+    Field::new("direction", Vec3::NEG_Z).doc("Where it shines to.")
+}
+
+fn attenuation(value: Vec3) -> Field {
+    Field::new("attenuation", value)
+        .alias("atten")
+        .doc("Constant, linear and quadratic: the light is divided by c + l d + q d^2. (0, 0, 1) is the inverse square law.")
+}
+
+fn radius() -> Field {
+    Field::new("radius", f32::INFINITY).unit("m").alias("range").doc("No effect beyond this distance.")
+}
+
+pub(super) fn types() -> Vec<NodeType> {
+    vec![
+        NodeType::new("DirectionalLight", "Parallel light, such as the sun's.").field(direction()).fields(common(PI, "lx")),
+        NodeType::new("SpotLight", "A cone of light.")
+            .field(place("location").alias("position"))
+            .field(direction().alias("spot_dir"))
+            .field(Field::new("cut_off_angle", 0.785f32).unit("rad").range(0.0, f64::from(std::f32::consts::PI)).doc("Half angle of the cone; dark beyond."))
+            .field(Field::new("beam_width", 0.589f32).unit("rad").range(0.0, f64::from(std::f32::consts::PI)).doc("Half angle of full brightness."))
+            .field(attenuation(Vec3::Z))
+            .field(radius())
+            .fields(common(100.0, "cd")),
+        NodeType::new("PointLight", "Light into all directions.")
+            .field(place("location").alias("position"))
+            .field(attenuation(Vec3::Z))
+            .field(radius())
+            .fields(common(100.0, "cd")),
+        NodeType::new("LightSource", "The light of OpenGL Performer and AVANGO (000 section 4.1): its place decides its kind.")
+            .alias("fpLightSource")
+            .alias("pfLightSource")
+            .field(Field::new("position", Vec4::Z).unit("m").alias("location").doc(
+                "w = 1: a place to shine from. w = 0: parallel light that comes from this direction.",
+            ))
+            .field(Field::new("spot_dir", Vec3::NEG_Z).alias("direction").doc("Where the cone and the shadow map point to."))
+            .field(Field::new("spot_cone", Vec2::new(0.0, 180.0)).doc(
+                "Fall-off exponent from the axis (0: even) and half angle of the cone in degrees (180: no cone), as in Performer.",
+            ))
+            .field(attenuation(Vec3::X))
+            .field(radius())
+            .fields(common(PI, "cd")),
+    ]
+}

@@ -1,0 +1,25 @@
+//! Shape and Appearance.
+
+use umbriel_fields::{Field, NodeType};
+
+pub(super) fn types() -> Vec<NodeType> {
+    vec![
+        NodeType::new("Shape", "Something visible: a geometry and how it looks.")
+            .field(Field::node("geometry").doc("A Mesh, Box, Sphere, Cone, Cylinder or Plane."))
+            .field(Field::node("appearance").doc("An Appearance; none is matt light grey."))
+            .field(Field::node("skin").doc("A Skin that bends the mesh by its joints."))
+            .field(Field::many::<f32>("morph_weights").doc("Share of each morph target of the mesh."))
+            .field(Field::new("visible", true).doc("Drawn, and casting shadows."))
+            .field(Field::new("cast_shadow", true).doc("Throws shadows."))
+            .field(Field::new("receive_shadow", true).doc("Shadows fall on it.")),
+        NodeType::new("Appearance", "How a shape looks.")
+            .field(Field::node("material").doc("A PhysicalMaterial, Material or UnlitMaterial."))
+            .field(
+                Field::choice("alpha_mode", &["auto", "opaque", "mask", "blend"], "auto")
+                    .doc("What alpha means. auto: blend if the material is transparent, else opaque."),
+            )
+            .field(Field::new("alpha_cutoff", 0.5f32).range(0.0, 1.0).doc("Smallest alpha that is there, for mask."))
+            .field(Field::new("shadow_caster", true).doc("Shapes with this appearance throw shadows."))
+            .field(Field::new("double_sided", false).doc("Seen and lit from both sides.")),
+    ]
+}
