@@ -6,7 +6,7 @@ use crate::changes::{ChangeLog, Revision};
 use crate::column::Columns;
 use crate::frame::Problem;
 use crate::graph::Node;
-use crate::{FieldId, FieldValue, NodeId, SetRule};
+use crate::{Field, FieldId, FieldValue, NodeId, SetRule};
 
 /// One evaluation of one node. Fields are addressed by their place in the declaration.
 pub struct Evaluation<'a> {
@@ -78,6 +78,17 @@ impl Evaluation<'_> {
         let Some(field) = self.node.field(index) else { return false };
         let revision = self.columns.revisions(field.field_type)[self.node.slots[index as usize] as usize];
         revision > self.evaluated && self.silenced.get(&FieldId { node: self.id, index }) != Some(&revision)
+    }
+
+    /// True if the field was ever written, since the node was created.
+    pub fn written(&self, index: u16) -> bool {
+        let Some(field) = self.node.field(index) else { return false };
+        self.columns.revisions(field.field_type)[self.node.slots[index as usize] as usize] > self.node.created
+    }
+
+    /// The declarations of the node's fields with their places.
+    pub fn fields(&self) -> impl Iterator<Item = (u16, &Field)> {
+        self.node.fields()
     }
 
     /// The place of a field by its name; for dynamic fields.

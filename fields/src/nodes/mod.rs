@@ -1,8 +1,32 @@
-//! The node types that worlds' dataflow is made of.
+//! The node types that worlds' dataflow is made of, one declaration each. Names and behaviour follow X3D 4 where X3D has the node.
+
+mod blend;
+mod clock;
+mod damper;
+mod interpolator;
+mod interval;
+mod keys;
+mod logic;
+mod sequencer;
+mod trigger;
+
+#[cfg(test)]
+mod tests;
 
 use crate::NodeType;
 
 /// Every node type of this crate, in the order of the manual.
 pub fn builtin_types() -> Vec<NodeType> {
-    Vec::new()
+    [
+        vec![clock::time_sensor()],
+        interpolator::types(),
+        sequencer::types(),
+        trigger::types(),
+        logic::types(),
+        vec![interval::interval_map()],
+        damper::types(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }

@@ -1,0 +1,65 @@
+//! The clock of a world.
+
+use crate::{Evaluation, Field, NodeType, SetRule, Time};
+
+const ENABLED: u16 = 0;
+const CYCLE_INTERVAL: u16 = 1;
+const LOOP: u16 = 2;
+const START_TIME: u16 = 3;
+const STOP_TIME: u16 = 4;
+const FRACTION_CHANGED: u16 = 5;
+const TIME: u16 = 6;
+const IS_ACTIVE: u16 = 7;
+const CYCLE_TIME: u16 = 8;
+
+pub(super) fn time_sensor() -> NodeType {
+    NodeType::new("TimeSensor", "A clock. It reads the time of the frame, which is the same for all nodes.")
+        .field(Field::new("enabled", true).doc("Runs at all."))
+        .field(Field::new("cycle_interval", Time(1.0)).unit("s").doc("Length of a cycle; more than zero."))
+        .field(Field::new("loop", false).doc("Starts the next cycle at the end of a cycle."))
+        .field(Field::new("start_time", Time(0.0)).unit("s").doc("When the first cycle starts."))
+        .field(Field::new("stop_time", Time(0.0)).unit("s").doc("When it stops, if that is after `start_time`."))
+        .field(
+            Field::new("fraction_changed", 0.0f32)
+                .on_set(SetRule::Pulse)
+                .output()
+                .range(0.0, 1.0)
+                .doc("Share of the cycle that has passed; 1 at its end."),
+        )
+        .field(Field::new("time", Time(0.0)).unit("s").output().doc("The time, while it runs."))
+        .field(Field::new("is_active", false).output().doc("Whether it runs."))
+        .field(Field::new("cycle_time", Time(0.0)).unit("s").output().doc("When the present cycle started."))
+        .evaluate(evaluate)
+}
+
+fn evaluate(evaluation: &mut Evaluation<'_>) {
+    let now = evaluation.time();
+    let interval = evaluation.get::<Time>(CYCLE_INTERVAL).0;
+    let start = evaluation.get::<Time>(START_TIME).0;
+    let stop = evaluation.get::<Time>(STOP_TIME).0;
+    let valid = interval > 0.0 && interval.is_finite() && start.is_finite();
+    if !valid && (evaluation.changed(CYCLE_INTERVAL) || evaluation.changed(START_TIME)) {
+        evaluation.report_field(CYCLE_INTERVAL, format!("cannot run: cycle_interval is {interval} s and start_time {start} s"));
+    }
+    let enabled = valid && evaluation.get::<bool>(ENABLED);
+    let cycles = (now - start) / interval;
+    let stopped = stop > start && now >= stop;
+    let over = !evaluation.get::<bool>(LOOP) && cycles >= 1.0;
+    let active = enabled && now >= start && !stopped && !over;
+    if active {
+        // A frame at the end of a cycle shows its end, not the beginning of the next (X3D 4 section 8.2.4.5).
+        let share = cycles.fract();
+        let at_end = share == 0.0 && cycles > 0.0;
+        let cycle = if at_end { cycles - 1.0 } else { cycles.floor() };
+        evaluation.set(FRACTION_CHANGED, if at_end { 1.0 } else { share as f32 });
+        evaluation.set(CYCLE_TIME, Time(start + cycle * interval));
+        evaluation.set(TIME, Time(now));
+    } else if enabled && over && !stopped && evaluation.get::<bool>(IS_ACTIVE) {
+        evaluation.set(FRACTION_CHANGED, 1.0f32);
+        evaluation.set(TIME, Time(now));
+    }
+    evaluation.set(IS_ACTIVE, active);
+    if active || enabled && now < start {
+        evaluation.again();
+    }
+}
