@@ -1,1 +1,202 @@
-//! x
+//! Meshes, materials, textures, surroundings: what is given, and what is wrong with it.
+
+use super::World;
+use glam::{Affine2, Vec2, Vec3, vec2, vec3};
+use std::sync::Arc;
+use umbriel_fields::{Color, Image, NodeId, Value};
+use umbriel_scene::{AlphaMode, Filter, Fog, FogKind, Shading, Wrap};
+
+fn painted(w: &mut World, kind: &str) -> [NodeId; 3] {
+    let shape = w.shape(&[w.root()], "it");
+    let (appearance, material) = (w.node("Appearance", "look"), w.node(kind, "paint"));
+    w.set(appearance, "material", material);
+    w.set(shape, "appearance", appearance);
+    [shape, appearance, material]
+}
+
+fn picture(w: &mut World, side: u32) -> NodeId {
+    let texture = w.node("ImageTexture", "picture");
+    w.set(texture, "image", Image { width: side, height: side, rgba: vec![7; 4 * (side * side) as usize].into() });
+    texture
+}
+
+#[test]
+fn arrays_of_a_mesh_are_shared_with_its_fields() {
+    let mut w = World::new();
+    let shape = w.below(&[w.root()], "Shape", "it");
+    let mesh = w.node("Mesh", "net");
+    let positions: Arc<[Vec3]> = [Vec3::ZERO, Vec3::X, Vec3::Y].into();
+    w.set(mesh, "position", positions.clone());
+    w.set(shape, "geometry", mesh);
+    w.update();
+    assert!(Arc::ptr_eq(&positions, &w.drawable("it").mesh.positions));
+    assert_eq!(&*w.drawable("it").mesh.indices, &[0, 1, 2]);
+}
+
+#[test]
+fn a_broken_geometry_is_reported_and_all_else_is_shown() {
+    let nan = vec3(f32::NAN, 0.0, 0.0);
+    let rows: [(&str, &str, Value, &str); 8] = [
+        ("Mesh", "index", [0, 1, 7].into(), "index 7"),
+        ("Mesh", "index", [0, -1, 2].into(), "index -1"),
+        ("Mesh", "normal", [Vec3::Y].into(), "normals has 1 entries"),
+        ("Mesh", "position", Vec::<Vec3>::new().into(), "no vertices"),
+        ("Mesh", "position", [Vec3::X, nan, Vec3::Y].into(), "position 1 is not finite"),
+        ("Box", "size", vec3(1.0, 0.0, 1.0).into(), "size.y is 0"),
+        ("Sphere", "radius", (-1.0f32).into(), "radius is -1"),
+        ("Cylinder", "height", f32::NAN.into(), "height is NaN"),
+    ];
+    for (kind, field, value, expected) in rows {
+        let mut w = World::new();
+        let shape = w.below(&[w.root()], "Shape", "it");
+        w.shape(&[w.root()], "other");
+        let geometry = w.node(kind, "bad");
+        if kind == "Mesh" {
+            w.set(geometry, "position", [Vec3::ZERO, Vec3::X, Vec3::Y]);
+        }
+        let before = w.graph.value_named(geometry, field).unwrap();
+        w.set(geometry, field, value);
+        w.set(shape, "geometry", geometry);
+        w.update();
+        let problems = w.problems();
+        assert_eq!((problems.len(), w.names()), (1, vec!["other"]), "{expected}: {problems:?}");
+        assert!(problems[0].starts_with(&format!("{kind} 'bad', geometry: ")) && problems[0].contains(expected), "{problems:?}");
+        w.set(geometry, field, before);
+        w.update();
+        assert_eq!(w.names(), ["it", "other"], "mended");
+    }
+    let mut w = World::new();
+    let shape = w.below(&[w.root()], "Shape", "it");
+    let light = w.node("PointLight", "lamp");
+    w.set(shape, "geometry", light);
+    w.update();
+    assert_eq!(w.problems(), ["PointLight 'lamp', geometry: a PointLight is no geometry; the shape is not shown"]);
+}
+
+#[test]
+fn solids_of_one_size_share_their_triangles() {
+    let mut w = World::new();
+    let root = w.root();
+    let shapes = ["a", "b", "c"].map(|name| w.shape(&[root], name));
+    let c = w.graph.get_named::<Option<NodeId>>(shapes[2], "geometry").unwrap().unwrap();
+    w.set(c, "size", Vec3::ONE);
+    w.update();
+    assert!(Arc::ptr_eq(&w.drawable("a").mesh, &w.drawable("b").mesh));
+    assert!(!Arc::ptr_eq(&w.drawable("a").mesh, &w.drawable("c").mesh));
+}
+
+#[test]
+fn alpha() {
+    let rows: [(&str, f32, AlphaMode); 6] = [
+        ("auto", 0.0, AlphaMode::Opaque),
+        ("auto", 0.3, AlphaMode::Blend),
+        ("opaque", 0.3, AlphaMode::Opaque),
+        ("mask", 0.0, AlphaMode::Mask { cutoff: 0.25 }),
+        ("blend", 0.0, AlphaMode::Blend),
+        ("auto", 1.0, AlphaMode::Blend),
+    ];
+    for (mode, transparency, expected) in rows {
+        let mut w = World::new();
+        let [_, appearance, material] = painted(&mut w, "PhysicalMaterial");
+        w.set(appearance, "alpha_mode", mode);
+        w.set(appearance, "alpha_cutoff", 0.25f32);
+        w.set(material, "transparency", transparency);
+        w.update();
+        let found = &w.drawable("it").material;
+        assert_eq!((found.alpha, found.base_color.w), (expected, 1.0 - transparency), "{mode} {transparency}");
+    }
+}
+
+#[test]
+fn textures() {
+    let mut w = World::new();
+    let [_, _, material] = painted(&mut w, "PhysicalMaterial");
+    let texture = picture(&mut w, 2);
+    w.set(material, "base_texture", texture);
+    w.set(material, "normal_texture", texture);
+    w.set(material, "normal_scale", 0.5f32);
+    w.set(texture, "wrap_s", "clamp");
+    w.set(texture, "wrap_t", "mirror");
+    w.set(texture, "filter", "nearest");
+    w.set(texture, "uv_set", 1);
+    w.set(texture, "translation", vec2(0.0, 1.0));
+    w.set(texture, "rotation", std::f32::consts::FRAC_PI_2);
+    w.set(texture, "scale", vec2(2.0, 3.0));
+    w.update();
+    assert!(w.problems().is_empty());
+    let found = w.drawable("it").material.clone();
+    let base = found.base_color_texture.as_ref().unwrap();
+    assert_eq!((base.sampler.wrap_u, base.sampler.wrap_v, base.sampler.filter), (Wrap::Clamp, Wrap::Mirror, Filter::Nearest));
+    assert_eq!((base.uv_set, found.normal_scale), (1, 0.5));
+    assert!(Arc::ptr_eq(&base.image, &found.normal_texture.as_ref().unwrap().image));
+    // KHR_texture_transform: a quarter turn counter-clockwise as seen brings u to -v.
+    assert!(base.uv_from_mesh.transform_point2(vec2(1.0, 0.0)).abs_diff_eq(vec2(0.0, -1.0), 1e-6));
+    assert!(base.uv_from_mesh.transform_point2(vec2(0.0, 1.0)).abs_diff_eq(vec2(3.0, 1.0), 1e-6));
+    w.set(texture, "scale", Vec2::splat(f32::NAN));
+    w.update();
+    assert_eq!(w.problems().len(), 1);
+    assert_eq!(w.drawable("it").material.base_color_texture.as_ref().unwrap().uv_from_mesh, Affine2::IDENTITY);
+}
+
+#[test]
+fn pictures_that_cannot_be_read_are_reported_and_the_shape_is_shown() {
+    let rows: [(&str, Value, &str); 4] = [
+        ("url", "no/such.png".into(), "file 'no/such.png'"),
+        ("url", "../../secret.png".into(), "not below the asset root"),
+        ("url", "".into(), "neither image nor url"),
+        ("image", Image { width: 9, height: 9, rgba: vec![0; 8].into() }.into(), "needs 324 bytes"),
+    ];
+    for (field, value, expected) in rows {
+        let mut w = World::new();
+        let [_, _, material] = painted(&mut w, "Material");
+        let texture = w.node("ImageTexture", "poster");
+        w.set(texture, field, value);
+        w.set(material, "diffuse_texture", texture);
+        w.update();
+        let problems = w.problems();
+        assert!(problems.len() == 1 && problems[0].contains("'poster'") && problems[0].contains(expected), "{problems:?}");
+        assert!(w.drawable("it").material.base_color_texture.is_none());
+        w.set(texture, "image", Image { width: 1, height: 1, rgba: vec![0; 4].into() });
+        w.update();
+        assert!(w.drawable("it").material.base_color_texture.is_some(), "mended");
+    }
+}
+
+#[test]
+fn materials_that_are_not_finite_are_plain_grey() {
+    let mut w = World::new();
+    let [_, _, material] = painted(&mut w, "Material");
+    w.set(material, "diffuse_color", Color(vec3(f32::NAN, 0.0, 0.0)));
+    w.update();
+    assert_eq!(w.problems(), ["Material 'paint', material: a number is not finite; shown in plain grey"]);
+    assert_eq!(w.drawable("it").material.base_color, Vec3::splat(0.8).extend(1.0));
+    w.set(material, "diffuse_color", Color(Vec3::X));
+    w.set(material, "shininess", 0.5f32);
+    w.update();
+    assert!(matches!(w.drawable("it").material.shading, Shading::Phong { exponent: 64.0, .. }));
+}
+
+#[test]
+fn surroundings() {
+    let mut w = World::new();
+    let [sky, fog, light] = ["Background", "Fog", "Environment"].map(|kind| w.node(kind, kind));
+    w.set(sky, "zenith_color", Color(Vec3::X));
+    w.set(fog, "visibility_range", 50.0f32);
+    w.set(fog, "fog_type", "exponential");
+    w.set(light, "ambient", Color(Vec3::Y));
+    w.set(light, "exposure", 2.0f32);
+    w.update();
+    assert_eq!((w.scene.background.zenith, w.scene.ambient, w.scene.exposure), (Vec3::X, Vec3::Y, 2.0));
+    assert_eq!(w.scene.fog, Some(Fog { color: Vec3::ONE, kind: FogKind::Exponential, visibility_range: 50.0 }));
+    let navigation = w.node("Navigation", "");
+    w.set(navigation, "scale", 10.0f32);
+    w.update();
+    assert_eq!(w.scene.fog.unwrap().visibility_range, 5.0, "metres of the room");
+    w.set(sky, "bound", false);
+    w.set(light, "exposure", f32::NAN);
+    w.graph.delete(fog).unwrap();
+    w.update();
+    assert_eq!((w.scene.background.zenith, w.scene.exposure), (crate::nodes::environment::ZENITH, 1.0));
+    assert!(w.scene.fog.is_none());
+    assert_eq!(w.problems(), ["Environment 'Environment', exposure: NaN makes no sense here; 1 is used"]);
+}
