@@ -42,8 +42,8 @@ pub enum Error {
     #[error("cannot open a window: {0}")]
     Window(String),
     /// The renderer gave up.
-    #[error("cannot draw: {0}")]
-    Render(String),
+    #[error(transparent)]
+    Render(#[from] umbriel_render::Error),
 }
 
 /// Why a rig gives no picture.

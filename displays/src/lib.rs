@@ -10,8 +10,8 @@ mod error;
 pub mod navigation;
 pub mod rig;
 mod watch;
+pub mod window;
 
 pub use error::Error;
 pub use watch::FileWatch;
-/// x
-pub type WindowSizes = std::collections::BTreeMap<String, [u32; 2]>;
+pub use window::WindowSizes;
