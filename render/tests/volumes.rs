@@ -220,6 +220,31 @@ fn a_light_inside_a_caster() {
     }
 }
 
+/// Within a closed caster everything is dark, whichever side of it throws the volume.
+#[test]
+fn the_eye_inside_a_closed_caster() {
+    let hall = || cuboid(Vec3::new(1.5, 1.0, 1.3)).at(Vec3::Y);
+    let inward = || hall().edited(|_, i| i.chunks_exact_mut(3).for_each(|t| t.swap(1, 2)));
+    let mirror = Mat4::from_scale(Vec3::new(1.0, 1.0, -1.0));
+    let stone = cuboid(Vec3::new(0.3, 0.2, 0.2)).at(Vec3::new(0.4, 0.5, -0.3));
+    let view = looking(Vec3::new(-1.0, 1.2, 0.9), Vec3::new(0.4, 0.7, -0.2), Frustum::symmetric(1.4, 1.3, 0.02));
+    let mut gpus = both();
+    for (name, hall) in [
+        ("outward", hall()),
+        ("inward", inward()),
+        ("mirrored", hall().under(mirror)),
+        ("inward and mirrored", inward().under(mirror)),
+        ("one mesh, one surface inward", merged(&[cuboid(Vec3::splat(0.2)).at(Vec3::new(0.0, 1.5, 0.0)), inward()])),
+    ] {
+        for toward_light in [sun(), lamp()] {
+            let score = compare(&mut gpus, std::slice::from_ref(&hall), std::slice::from_ref(&stone), toward_light, &view);
+            println!("{name}: {} of {} wrong", score.wrong, score.counted);
+            assert!(score.wrong as f64 <= ALLOWED * score.counted as f64, "{name}: {} of {} wrong", score.wrong, score.counted);
+            assert!(score.shadowed == score.counted && score.counted > 50_000, "{name}");
+        }
+    }
+}
+
 /// More layers than eight bits count: on the floor lie 300, 256 and 128 of them side by side.
 #[test]
 fn three_hundred_layers() {
@@ -263,8 +288,10 @@ fn lists_are_kept_and_renewed() {
     let (first, _) = shadowed(&[&a, &b], sun(), false);
     let (b_alone, _) = shadowed(&[&b], sun(), false);
     assert!(first > b_alone + 200 && b_alone > 50, "{first} {b_alone}");
-    // Casters, light, whether the positions of `a` are written, shadowed more than `b` alone, extracted, kept, left out.
-    let rows: [(&str, &[&Loaded], Vec4, bool, bool, [usize; 3]); 8] = [
+    /// Name, casters, light, are the positions of `a` written, is more in shadow than by `b` alone; lists extracted,
+    /// kept, left out.
+    type Row<'a> = (&'static str, &'a [&'a Loaded], Vec4, bool, bool, [usize; 3]);
+    let rows: [Row<'_>; 8] = [
         ("a again beside b", &[&a, &b], sun(), false, true, [1, 1, 0]),
         ("nothing changed", &[&a, &b], sun(), false, true, [0, 2, 0]),
         ("order changed", &[&b, &a], sun(), false, true, [0, 2, 0]),

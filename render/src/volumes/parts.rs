@@ -204,8 +204,9 @@ mod tests {
         mixed.swap(1, 2);
         let mut dented = boxes(1, &OUTWARD);
         Arc::make_mut(&mut dented.positions)[7] = Vec3::splat(0.3);
-        // Name, mesh, triangles of each part, their winding, layers of each part.
-        let rows: Vec<(&str, Mesh, Vec<usize>, u32, Vec<u32>)> = vec![
+        /// Name, mesh, triangles of each part, their winding, layers of each part.
+        type Row = (&'static str, Mesh, Vec<usize>, u32, Vec<u32>);
+        let rows: Vec<Row> = vec![
             ("nothing", Mesh::default(), vec![], 0, vec![]),
             ("outward", boxes(1, &OUTWARD), vec![12], 1, vec![1]),
             ("inward", boxes(1, &inward), vec![12], 2, vec![1]),

@@ -2,3 +2,4 @@
 
 mod lights;
 mod support;
+mod town;
