@@ -1,2 +1,53 @@
-//! The `umbriel` command.
-fn main() {}
+//! The `umbriel` command: shows worlds written in rhai and models, in windows or in files, and scores their shadows.
+
+mod cli;
+mod headless;
+mod model;
+mod nodes;
+mod png;
+mod scene_file;
+mod session;
+mod shadow_error;
+mod window;
+
+use clap::Parser;
+use cli::{Cli, Command};
+use std::io::Write;
+use std::process::ExitCode;
+
+/// The exit status of a command that did its work, but reported problems on the way.
+const WITH_PROBLEMS: u8 = 2;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter.unwrap_or_else(|_| "warn,wgpu_hal=error,wgpu_core=error,naga=error".into()))
+        .with_writer(std::io::stderr)
+        .without_time()
+        .with_target(false)
+        .init();
+    let result = match &cli.command {
+        Command::Run(args) if args.headless => headless::run(args),
+        Command::Run(args) => window::run(args).map(|()| 0),
+        Command::ShadowError(args) => shadow_error::run(args),
+        Command::Nodes(args) => nodes::reference(args.name.as_deref()).map(|text| print(&text)).map_err(Into::into),
+    };
+    match result {
+        Ok(0) => ExitCode::SUCCESS,
+        Ok(problems) => {
+            tracing::error!("done, with {problems} {}", if problems == 1 { "problem" } else { "problems" });
+            ExitCode::from(WITH_PROBLEMS)
+        }
+        Err(error) => {
+            tracing::error!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Prints a long text; a reader that has seen enough is no problem.
+fn print(text: &str) -> usize {
+    let _ = std::io::stdout().write_all(text.as_bytes());
+    0
+}

@@ -57,8 +57,13 @@ fn every_crate_reaches_only_what_lies_below_it() {
 #[test]
 fn every_crate_is_in_the_table() {
     let manifest: toml::Table = std::fs::read_to_string(root().join("Cargo.toml")).unwrap().parse().unwrap();
-    let members: BTreeSet<&str> =
-        manifest["workspace"]["members"].as_array().unwrap().iter().map(|m| m.as_str().unwrap()).filter(|m| *m != "xtask").collect();
+    let members: BTreeSet<&str> = manifest["workspace"]["members"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|m| m.as_str().unwrap())
+        .filter(|m| *m != "xtask")
+        .collect();
     let table: BTreeSet<&str> = LAYERS.iter().map(|(_, folder, ..)| *folder).collect();
     assert_eq!(members, table);
 }

@@ -27,7 +27,8 @@ fn worlds() -> Vec<PathBuf> {
 
 fn draw(world: &Path) -> RgbImage {
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(world.with_extension("png").file_name().expect("worlds have names"));
-    let run = umbriel(&["run", world.to_str().expect("paths are text"), "--headless", "--out", out.to_str().expect("paths are text")]);
+    let run =
+        umbriel(&["run", world.to_str().expect("paths are text"), "--headless", "--out", out.to_str().expect("paths are text")]);
     assert!(run.ok, "{}: {}", world.display(), run.stderr);
     image::open(&out).unwrap_or_else(|e| panic!("{}: {e}", out.display())).to_rgb8()
 }

@@ -1,5 +1,8 @@
 //! What several tests need.
 
+#[cfg(target_os = "linux")]
+pub(crate) mod screen;
+
 use std::path::{Path, PathBuf};
 
 /// The root of the repository.
@@ -14,7 +17,11 @@ pub(crate) fn samples() -> Option<PathBuf> {
     if folder.is_dir() {
         return Some(folder);
     }
-    assert!(std::env::var_os("UMBRIEL_REQUIRE_SAMPLES").is_none(), "the samples are required, but {} is absent", folder.display());
+    assert!(
+        std::env::var_os("UMBRIEL_REQUIRE_SAMPLES").is_none(),
+        "the samples are required, but {} is absent",
+        folder.display()
+    );
     println!("not run: the samples are absent ({})", folder.display());
     None
 }
@@ -31,7 +38,8 @@ pub(crate) struct Run {
 
 /// Runs the `umbriel` command to its end.
 pub(crate) fn umbriel(args: &[&str]) -> Run {
-    let output = std::process::Command::new(env!("CARGO_BIN_EXE_umbriel")).args(args).output().expect("the command can be started");
+    let output =
+        std::process::Command::new(env!("CARGO_BIN_EXE_umbriel")).args(args).output().expect("the command can be started");
     Run {
         ok: output.status.success(),
         stdout: String::from_utf8_lossy(&output.stdout).into_owned(),

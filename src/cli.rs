@@ -1,0 +1,166 @@
+//! The words of the command line.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// A dataflow field-container VR framework: scripted worlds, shadows, and every view of an installation.
+///
+/// RUST_LOG sets what is logged, such as RUST_LOG=info or RUST_LOG=umbriel_render=debug.
+#[derive(Debug, Parser)]
+#[command(name = "umbriel", version)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Shows a world or a model in windows, or draws it to files
+    ///
+    /// Windows: drag with the left button to orbit, right to pan, wheel to zoom, W A S D to go, Page Up and Page Down for
+    /// viewpoints, Home to return, R to reload, P for a screenshot, Escape to end. Saved files are read again.
+    ///
+    /// Exit status: 0 all went well, 1 nothing could be shown, 2 shown, but problems were reported.
+    Run(Run),
+    /// Scores the shadows of one light against ray-traced ones
+    ///
+    /// The last line printed is `disagreement=<percent> iou=<0..1> pixels=<n>`: over the pixels that the truth holds to be
+    /// lit or shadowed in all sub-samples, the share where the renderer disagrees, and intersection over union of the
+    /// shadow.
+    ShadowError(ShadowError),
+    /// Prints the reference of node types
+    Nodes(Nodes),
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Run {
+    /// A world (.rhai) or a model (.gltf, .glb)
+    pub(crate) path: PathBuf,
+    /// Draw to PNG files instead of windows
+    #[arg(long)]
+    pub(crate) headless: bool,
+    /// Pixels of each picture, such as 1280x720
+    #[arg(long, value_parser = size)]
+    pub(crate) size: Option<[u32; 2]>,
+    /// Frames to draw
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), requires = "headless")]
+    pub(crate) frames: u32,
+    /// Time of the first frame in seconds
+    #[arg(long, default_value_t = 0.0, value_parser = finite)]
+    pub(crate) time: f64,
+    /// Frames per second of the world's time
+    #[arg(long, default_value_t = 60.0, value_parser = positive, requires = "headless")]
+    pub(crate) fps: f64,
+    /// The display or viewpoint to show, by name
+    #[arg(long)]
+    pub(crate) view: Option<String>,
+    /// File to write; frames after the first get a number, displays after the first their name
+    #[arg(long, requires = "headless")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct ShadowError {
+    /// A world (.rhai) or a model (.gltf, .glb)
+    #[arg(required_unless_present = "scene", conflicts_with = "scene")]
+    pub(crate) path: Option<PathBuf>,
+    /// A scene file: models, one light, one camera (JSON)
+    #[arg(long)]
+    pub(crate) scene: Option<PathBuf>,
+    /// The light, by name; otherwise the first that casts shadows
+    #[arg(long, conflicts_with = "scene")]
+    pub(crate) light: Option<String>,
+    /// The display or viewpoint, by name; of a display its first view counts
+    #[arg(long, conflicts_with = "scene")]
+    pub(crate) view: Option<String>,
+    /// Shadow method; otherwise the light's own, and volumes for scene files
+    #[arg(long, value_enum)]
+    pub(crate) method: Option<Method>,
+    /// Side of the shadow map in texels
+    #[arg(long)]
+    pub(crate) map_size: Option<u32>,
+    /// Pixels of the picture, such as 800x600
+    #[arg(long, value_parser = size)]
+    pub(crate) size: Option<[u32; 2]>,
+    /// Time of the frame in seconds
+    #[arg(long, default_value_t = 0.0, value_parser = finite)]
+    pub(crate) time: f64,
+    /// Rays per pixel and axis
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub(crate) sub_samples: u32,
+    /// Score against this mask (grey PNG: 0 background, 1 lit, 2 shadow, 3 away, 4 outside the cone, 255 edge) instead of
+    /// tracing
+    #[arg(long)]
+    pub(crate) truth: Option<PathBuf>,
+    /// Score this mask against the truth instead of rendering: the tracer against another's
+    #[arg(long, conflicts_with = "method")]
+    pub(crate) trace_only: bool,
+    /// Write a picture of the differences: red where a shadow is missing, blue where one is wrong
+    #[arg(long)]
+    pub(crate) diff: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Nodes {
+    /// One type; otherwise all of them, a line each
+    pub(crate) name: Option<String>,
+}
+
+/// How a light casts shadows.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Method {
+    /// Shadow map
+    Map,
+    /// Stencil shadow volumes
+    Volume,
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let parse = || {
+        let (width, height) = text.split_once(['x', 'X'])?;
+        Some([width.parse().ok()?, height.parse().ok()?])
+    };
+    match parse() {
+        Some([0, _] | [_, 0]) => Err("a picture needs at least one pixel each way".to_string()),
+        Some(size) if size.iter().any(|s| *s > 16384) => Err("a side may have at most 16384 pixels".to_string()),
+        Some(size) => Ok(size),
+        None => Err("expected WIDTHxHEIGHT, such as 1280x720".to_string()),
+    }
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "expected a number of seconds".to_string())?;
+    if value.is_finite() { Ok(value) } else { Err("expected a finite number".to_string()) }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = finite(text)?;
+    if value > 0.0 { Ok(value) } else { Err("expected a number above 0".to_string()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes() {
+        let rows = [
+            ("1280x720", Some([1280, 720])),
+            ("1X1", Some([1, 1])),
+            ("0x10", None),
+            ("99999x1", None),
+            ("axb", None),
+            ("12", None),
+            ("-3x4", None),
+        ];
+        for (text, expected) in rows {
+            assert_eq!(size(text).ok(), expected, "{text}");
+        }
+    }
+}

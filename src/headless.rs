@@ -1,0 +1,107 @@
+//! Draws a world to files.
+
+use crate::cli::Run;
+use crate::png;
+use crate::session::Session;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::{Path, PathBuf};
+use umbriel_displays::WindowSizes;
+use umbriel_render::{Gpu, Renderer};
+use umbriel_scene::Picture;
+
+const DESKTOP_SIZE: [u32; 2] = [1280, 720];
+
+/// Draws the frames that were asked for. Gives the number of problems that were reported meanwhile.
+pub(crate) fn run(args: &Run) -> Result<usize, Box<dyn std::error::Error>> {
+    let mut session = Session::open(&args.path)?;
+    let gpu = Gpu::new(None)?;
+    let mut renderer = Renderer::new(&gpu)?;
+    let device = describe(&gpu);
+    tracing::info!("drawing on {device}");
+    let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}.png", session.name())));
+    let bar = progress(args.frames, "frames");
+    let (mut problems, mut last) = (0, 0);
+    if args.time > 0.0 {
+        session.step(0.0); // what starts with the world starts before the jump
+    }
+    for frame in 0..args.frames {
+        session.step(args.time + f64::from(frame) / args.fps);
+        let pictures = pictures(&mut session, args)?;
+        let stats = renderer.render(session.scene(), &pictures)?;
+        tracing::debug!("frame {frame}: {stats:?}");
+        for (place, picture) in pictures.iter().enumerate() {
+            let name = (pictures.len() > 1).then_some(picture.name.as_str());
+            let path = numbered(&out, name, (args.frames > 1).then_some(frame));
+            png::write(&path, &png::row(&renderer.read_back(place)?), &device)?;
+            last += 1;
+            bar.set_message(path.display().to_string());
+        }
+        for problem in session.problems().into_iter().chain(renderer.problems()) {
+            bar.suspend(|| tracing::error!("{problem}"));
+            problems += 1;
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    println!("{last} pictures, the last {}", bar.message());
+    Ok(problems)
+}
+
+/// The pictures of the frame; `--size` is that of each of them.
+pub(crate) fn pictures(session: &mut Session, args: &Run) -> Result<Vec<Picture>, umbriel_displays::Error> {
+    let size = args.size.unwrap_or(DESKTOP_SIZE);
+    let natural = session.pictures(args.view.as_deref(), size, &WindowSizes::new())?;
+    let Some(size) = args.size else { return Ok(natural) };
+    let windows: WindowSizes = natural.into_iter().map(|p| (p.name, size)).collect();
+    session.pictures(args.view.as_deref(), size, &windows)
+}
+
+/// Name and driver of a device.
+pub(crate) fn describe(gpu: &Gpu) -> String {
+    let info = &gpu.info;
+    [&info.name, &info.driver, &info.driver_info]
+        .iter()
+        .filter(|s| !s.is_empty())
+        .map(|s| s.as_str())
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// A bar on the terminal; nothing where there is none.
+pub(crate) fn progress(length: u32, unit: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(&format!("{{bar:30}} {{pos}}/{{len}} {unit}, {{eta}} left  {{msg}}"));
+    ProgressBar::new(length.into()).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// `out.png`, `out.wall.png`, `out.0007.png`, `out.wall.0007.png`.
+fn numbered(out: &Path, picture: Option<&str>, frame: Option<u32>) -> PathBuf {
+    let mut name = out.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    for part in [picture.map(file_name), frame.map(|f| format!("{f:04}"))].into_iter().flatten() {
+        name = format!("{name}.{part}");
+    }
+    out.with_file_name(format!("{name}.png"))
+}
+
+/// A name of a display as a part of a file's name.
+fn file_name(name: &str) -> String {
+    name.chars().map(|c| if c.is_alphanumeric() || "-_ ".contains(c) { c } else { '_' }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_files() {
+        let rows = [
+            ("a/b.png", None, None, "a/b.png"),
+            ("b", None, None, "b.png"),
+            ("a/b.png", Some("wall"), None, "a/b.wall.png"),
+            ("a/b.png", None, Some(7), "a/b.0007.png"),
+            ("a/b.png", Some("../x"), Some(12345), "a/b.___x.12345.png"),
+        ];
+        for (out, picture, frame, expected) in rows {
+            assert_eq!(numbered(Path::new(out), picture, frame), Path::new(expected));
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! A world or a model that is shown: the loop that sees all crates, up to the renderer.
+
+use crate::model;
+use glam::Vec3;
+use std::path::{Path, PathBuf};
+use umbriel_displays::WindowSizes;
+use umbriel_displays::navigation::{Input, NavigationNode};
+use umbriel_displays::rig::{Rig, Wanted};
+use umbriel_fields::Graph;
+use umbriel_scene::{Aabb, Picture, Scene};
+use umbriel_scenegraph::{Extractor, Viewpoint};
+use umbriel_scripts::World;
+
+/// Why there is nothing to show.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum OpenError {
+    /// The file's name does not say what it is.
+    #[error("{}: neither a world (.rhai) nor a model (.gltf, .glb)", .0.display())]
+    Kind(PathBuf),
+    /// The script is wrong.
+    #[error(transparent)]
+    Script(#[from] umbriel_scripts::ScriptError),
+    /// The model is wrong.
+    #[error(transparent)]
+    Model(#[from] model::Error),
+}
+
+/// A running world with its flat scene.
+pub(crate) struct Session {
+    path: PathBuf,
+    world: World,
+    extractor: Extractor,
+    scene: Scene,
+    rig: Rig,
+    generation: u64,
+    navigation: Option<NavigationNode>,
+    /// What was reported and not yet told.
+    problems: Vec<String>,
+}
+
+impl Session {
+    /// Opens a world or a model.
+    pub(crate) fn open(path: &Path) -> Result<Session, OpenError> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        let world = match extension.as_str() {
+            "rhai" => World::load_file(path)?,
+            "gltf" | "glb" => {
+                let mut world = World::new();
+                model::show(world.graph_mut(), path)?;
+                world
+            }
+            _ => return Err(OpenError::Kind(path.to_path_buf())),
+        };
+        Ok(Session::of(world, path))
+    }
+
+    /// Shows a world that is there already; pictures that its nodes name lie beside `path`.
+    pub(crate) fn of(world: World, path: &Path) -> Session {
+        Session {
+            path: path.to_path_buf(),
+            generation: world.generation(),
+            world,
+            extractor: extractor_beside(path),
+            scene: Scene::default(),
+            rig: Rig::new(),
+            navigation: None,
+            problems: Vec::new(),
+        }
+    }
+
+    /// Runs one frame of the world and brings the scene up to date.
+    pub(crate) fn step(&mut self, time_s: f64) {
+        let report = self.world.step(time_s);
+        self.problems.extend(self.world.problems().iter().map(ToString::to_string));
+        let graph = self.world.graph();
+        let place = |p: &umbriel_fields::Problem| p.field.map_or_else(|| graph.describe(p.node), |f| graph.describe_field(f));
+        self.problems.extend(report.problems.iter().map(|p| format!("{}: {}", place(p), p.message)));
+        self.extract();
+    }
+
+    fn extract(&mut self) {
+        if self.world.generation() != self.generation {
+            self.generation = self.world.generation();
+            self.extractor = extractor_beside(&self.path);
+            self.scene = Scene::default();
+            self.navigation = None;
+            self.rig.refit();
+        }
+        self.extractor.update(self.world.graph(), &mut self.scene);
+        self.problems.extend(self.extractor.problems().iter().map(ToString::to_string));
+    }
+
+    /// What the displays show, or the named display or viewpoint. `size` is that of a desktop's picture, `windows` that of
+    /// displays that do not have the size that they ask for.
+    pub(crate) fn pictures(
+        &mut self,
+        view: Option<&str>,
+        size: [u32; 2],
+        windows: &WindowSizes,
+    ) -> Result<Vec<Picture>, umbriel_displays::Error> {
+        let bounds = bounds(&self.scene);
+        let wanted = Wanted { view, size, windows };
+        let found = self.rig.pictures(self.world.graph(), self.extractor.viewpoints(), &bounds, &wanted)?;
+        self.problems.extend(found.problems.iter().map(ToString::to_string));
+        Ok(found.pictures)
+    }
+
+    /// The scene of the last step.
+    pub(crate) fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The scene of the last step, to be changed by whoever draws it once.
+    pub(crate) fn scene_mut(&mut self) -> &mut Scene {
+        &mut self.scene
+    }
+
+    /// The graph.
+    pub(crate) fn graph(&self) -> &Graph {
+        self.world.graph()
+    }
+
+    /// The viewpoints of the world, in tree order.
+    pub(crate) fn viewpoints(&self) -> &[Viewpoint] {
+        self.extractor.viewpoints()
+    }
+
+    /// Place of a light of the scene, by the name of its node.
+    pub(crate) fn light_named(&self, name: &str) -> Option<usize> {
+        self.extractor.light_of(self.graph().find(name)?)
+    }
+
+    /// Moves the room through the world by mouse or keys.
+    pub(crate) fn navigate(&mut self, input: Input<'_>) {
+        if let Err(error) = self.try_navigate(input) {
+            self.problems.push(error.to_string());
+        }
+    }
+
+    fn try_navigate(&mut self, input: Input<'_>) -> Result<(), umbriel_displays::Error> {
+        let centre = bounds(&self.scene).centre();
+        let graph = self.world.graph_mut();
+        let node = match self.navigation {
+            Some(node) if graph.contains(node.node) => node,
+            _ => NavigationNode::find_or_create(graph, centre)?,
+        };
+        self.navigation = Some(node);
+        let mut navigator = node.read(graph)?;
+        navigator.step(input);
+        node.write(graph, &navigator)
+    }
+
+    /// Puts the room back to where it stands without navigation.
+    pub(crate) fn reset_navigation(&mut self) {
+        let Some(node) = self.navigation else { return };
+        let graph = self.world.graph_mut();
+        let result = node.read(graph).and_then(|mut navigator| {
+            navigator.position = Vec3::ZERO;
+            navigator.orientation = glam::Quat::IDENTITY;
+            node.write(graph, &navigator)
+        });
+        self.problems.extend(result.err().map(|e| e.to_string()));
+    }
+
+    /// Reads the files again. Where they are wrong, that is reported and what was there stays.
+    pub(crate) fn reload(&mut self) {
+        if self.path.extension().is_some_and(|e| e == "rhai") {
+            self.world.reload();
+            self.problems.extend(self.world.problems().iter().map(ToString::to_string));
+            return;
+        }
+        match Session::open(&self.path) {
+            Ok(fresh) => {
+                let problems = std::mem::take(&mut self.problems);
+                *self = Session { problems, ..fresh };
+            }
+            Err(error) => self.problems.push(error.to_string()),
+        }
+    }
+
+    /// The files that were read.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        let own = std::iter::once(self.path.clone());
+        own.chain(self.world.files().map(Path::to_path_buf).filter(|f| *f != self.path)).collect()
+    }
+
+    /// Name of the world: its file without folder and extension.
+    pub(crate) fn name(&self) -> String {
+        self.path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+    }
+
+    /// Problems since this was last called.
+    pub(crate) fn problems(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.problems)
+    }
+}
+
+/// Box around everything that is shown.
+pub(crate) fn bounds(scene: &Scene) -> Aabb {
+    scene.drawables.iter().filter(|d| d.visible).fold(Aabb::EMPTY, |b, d| b.union(d.bounds_in_world))
+}
+
+fn extractor_beside(path: &Path) -> Extractor {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    Extractor::new().with_asset_root(folder)
+}

@@ -1,0 +1,166 @@
+//! Scores the shadows of one light against ray-traced ones (S13).
+
+use crate::cli::{Method, ShadowError};
+use crate::headless::{describe, progress};
+use crate::png;
+use crate::scene_file::{self, SceneFile};
+use crate::session::Session;
+use std::path::Path;
+use std::sync::Arc;
+use umbriel_displays::WindowSizes;
+use umbriel_render::{Gpu, Renderer, RgbaPixels};
+use umbriel_scene::{Mask, Picture, PictureKind, Scene, ShadowMethod, TraceOptions, Tracer, View, difference, score};
+use umbriel_scenegraph::Extractor;
+
+type Failure = Box<dyn std::error::Error>;
+
+const SIZE: [u32; 2] = [800, 600];
+
+/// What is scored.
+struct Subject {
+    scene: Scene,
+    light: usize,
+    view: View,
+    options: TraceOptions,
+    problems: Vec<String>,
+}
+
+/// Renders, traces, and prints the score; gives the number of problems that were reported.
+pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
+    let mut subject = match (&args.scene, &args.path) {
+        (Some(file), _) => from_scene_file(&scene_file::read(file)?, file, args)?,
+        (None, Some(path)) => from_world(path, args)?,
+        (None, None) => unreachable!("the command line asks for one of them"),
+    };
+    let light = &mut subject.scene.lights[subject.light];
+    if let Some(method) = args.method {
+        light.shadows = method.into();
+    }
+    light.map.size = args.map_size.unwrap_or(light.map.size);
+    let shown = format!("light '{}' by {:?}", light.name, light.shadows);
+    if light.shadows == ShadowMethod::None && !args.trace_only {
+        return Err(format!("{shown}: it casts no shadows; choose a --method").into());
+    }
+
+    let truth = match &args.truth {
+        Some(path) => read_mask(path, subject.view.size)?,
+        None => trace(&subject)?,
+    };
+    let (visibility, by) =
+        if args.trace_only { (trace(&subject)?.visibility(), "CPU tracer".to_string()) } else { render(&mut subject)? };
+    for problem in &subject.problems {
+        tracing::error!("{problem}");
+    }
+    let score = score(&truth, &visibility)?;
+    if let Some(path) = &args.diff {
+        let [width, height] = subject.view.size;
+        png::write(path, &RgbaPixels { width, height, rgba: difference(&truth, &visibility)? }, &by)?;
+    }
+    println!("{shown}, view '{}' {}x{}, {by}", subject.view.name, subject.view.size[0], subject.view.size[1]);
+    println!("disagreement={:.4}% iou={:.4} pixels={}", 100.0 * score.disagreement, score.iou, score.pixels);
+    Ok(subject.problems.len())
+}
+
+impl From<Method> for ShadowMethod {
+    fn from(method: Method) -> ShadowMethod {
+        match method {
+            Method::Map => ShadowMethod::Map,
+            Method::Volume => ShadowMethod::Volume,
+        }
+    }
+}
+
+fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
+    let mut session = Session::open(path)?;
+    if args.time > 0.0 {
+        session.step(0.0);
+    }
+    session.step(args.time);
+    let size = args.size.unwrap_or(SIZE);
+    let mut pictures = session.pictures(args.view.as_deref(), size, &WindowSizes::new())?;
+    if let (Some(size), Some(name)) = (args.size, pictures.first().map(|p| p.name.clone())) {
+        pictures = session.pictures(args.view.as_deref(), size, &WindowSizes::from([(name, size)]))?;
+    }
+    let view = pictures.into_iter().flat_map(|p| p.views).next().ok_or("there is nothing to see the world from")?;
+    let lights = &session.scene().lights;
+    let light = match &args.light {
+        Some(name) => session.light_named(name).ok_or_else(|| no_light(name, lights))?,
+        None => {
+            let casting = lights.iter().position(|l| l.shadows != ShadowMethod::None);
+            casting.or((!lights.is_empty()).then_some(0)).ok_or("the world has no light that is on")?
+        }
+    };
+    let options = TraceOptions { sub_samples: args.sub_samples, ..TraceOptions::default() };
+    let problems = session.problems();
+    Ok(Subject { scene: std::mem::take(session.scene_mut()), light, view, options, problems })
+}
+
+fn no_light(name: &str, lights: &[umbriel_scene::Light]) -> String {
+    let names: Vec<&str> = lights.iter().map(|l| l.name.as_str()).filter(|n| !n.is_empty()).collect();
+    format!("no light '{name}' is on in this world; there are: {}", names.join(", "))
+}
+
+/// The models of a scene file, with its light alone.
+fn from_scene_file(file: &SceneFile, path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
+    let mut scene = Scene::default();
+    let mut problems = Vec::new();
+    for model in &file.models {
+        let mut graph = umbriel_scenegraph::new_graph();
+        let options = umbriel_scenegraph::gltf::LoadOptions::default();
+        let loaded = umbriel_scenegraph::gltf::load(&mut graph, &model.file, &options)?;
+        let world = graph.find(umbriel_scenegraph::WORLD).ok_or("the graph has no world")?;
+        let children: Arc<[_]> = [Some(loaded.root)].into();
+        graph.set_named(world, "children", children)?;
+        let (mut extractor, mut part) = (Extractor::new(), Scene::default());
+        extractor.update(&graph, &mut part);
+        problems.extend(extractor.problems().iter().map(ToString::to_string));
+        for mut drawable in part.drawables {
+            drawable.world_from_object = model.world_from_model * drawable.world_from_object;
+            drawable.bounds_in_world = drawable.bounds_in_world.transformed(&model.world_from_model);
+            drawable.casts_shadow &= model.caster;
+            drawable.receives_shadow &= model.receiver;
+            let casts = file.options.blend_casts || drawable.material.alpha != umbriel_scene::AlphaMode::Blend;
+            drawable.casts_shadow &= casts;
+            if model.double_sided {
+                Arc::make_mut(&mut drawable.material).double_sided = true;
+            }
+            scene.drawables.push(drawable);
+        }
+    }
+    let mut light = file.light.clone();
+    light.shadows = ShadowMethod::Volume;
+    light.name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    scene.lights = vec![light];
+    let mut view = file.view.clone();
+    view.size = args.size.unwrap_or(view.size);
+    Ok(Subject { scene, light: 0, view, options: file.options.clone(), problems })
+}
+
+fn read_mask(path: &Path, size: [u32; 2]) -> Result<Mask, Failure> {
+    let grey = image::open(path).map_err(|e| format!("{}: {e}", path.display()))?.into_luma8();
+    if grey.dimensions() != (size[0], size[1]) {
+        let (width, height) = grey.dimensions();
+        return Err(format!("{}: {width}x{height} pixels, but the view has {}x{}", path.display(), size[0], size[1]).into());
+    }
+    Ok(Mask::from_grey(size[0], size[1], grey.as_raw()).map_err(|e| format!("{}: {e}", path.display()))?)
+}
+
+fn trace(subject: &Subject) -> Result<Mask, Failure> {
+    let bar = progress(subject.view.size[1], "rows traced");
+    let tracer = Tracer::new(&subject.scene);
+    let light = &subject.scene.lights[subject.light];
+    let mask = tracer.visibility(light, &subject.view, &subject.options, &|rows| bar.set_position(rows.into()));
+    bar.finish_and_clear();
+    Ok(mask?)
+}
+
+/// One byte per pixel, and the device that drew it.
+fn render(subject: &mut Subject) -> Result<(Vec<u8>, String), Failure> {
+    let gpu = Gpu::new(None)?;
+    let mut renderer = Renderer::new(&gpu)?;
+    let picture = Picture { kind: PictureKind::LightVisibility(subject.light), ..Picture::mono(subject.view.clone()) };
+    renderer.render(&subject.scene, &[picture])?;
+    subject.problems.extend(renderer.problems());
+    let pixels = renderer.read_back(0)?.pop().ok_or("the renderer gave no picture")?;
+    Ok((pixels.rgba.chunks_exact(4).map(|p| p[0]).collect(), describe(&gpu)))
+}

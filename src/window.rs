@@ -1,0 +1,106 @@
+//! Shows a world in windows.
+
+use crate::cli::Run;
+use crate::png;
+use crate::session::Session;
+use std::path::PathBuf;
+use umbriel_displays::WindowSizes;
+use umbriel_displays::navigation::Input;
+use umbriel_displays::window::{self, App, Command, Frame, Options};
+use umbriel_render::RgbaPixels;
+
+const DESKTOP_SIZE: [u32; 2] = [1280, 720];
+
+/// Opens the windows and runs until they are closed.
+pub(crate) fn run(args: &Run) -> Result<(), Box<dyn std::error::Error>> {
+    let session = Session::open(&args.path)?;
+    let mut app = Viewer { session, view: args.view.clone(), size: args.size, watched: Vec::new() };
+    app.session.step(args.time);
+    app.session.pictures(app.view.as_deref(), DESKTOP_SIZE, &WindowSizes::new())?; // a wrong --view ends here
+    Ok(window::run(&mut app, Options { start_s: args.time, frames: None })?)
+}
+
+struct Viewer {
+    session: Session,
+    view: Option<String>,
+    size: Option<[u32; 2]>,
+    watched: Vec<PathBuf>,
+}
+
+impl Viewer {
+    /// Shows the viewpoint `step` places on from the present one.
+    fn turn_to(&mut self, step: isize) {
+        let names: Vec<String> = self.session.viewpoints().iter().map(|v| v.name.clone()).collect();
+        if names.is_empty() {
+            return;
+        }
+        let now = self.view.as_ref().and_then(|v| names.iter().position(|n| n == v)).unwrap_or(0) as isize;
+        self.view = Some(names[(now + step).rem_euclid(names.len() as isize) as usize].clone());
+        self.session.reset_navigation();
+    }
+
+    fn tell(&mut self) {
+        for problem in self.session.problems() {
+            tracing::error!("{problem}");
+        }
+    }
+}
+
+impl App for Viewer {
+    fn frame(&mut self, time_s: f64, windows: &WindowSizes) -> Frame<'_> {
+        self.session.step(time_s);
+        let size = self.size.unwrap_or(DESKTOP_SIZE);
+        let pictures = self.session.pictures(self.view.as_deref(), size, windows).or_else(|error| {
+            // The named view went away with a reload.
+            tracing::error!("{error}");
+            self.view = None;
+            self.session.pictures(None, size, windows)
+        });
+        self.tell();
+        let pictures = pictures.unwrap_or_else(|error| {
+            tracing::error!("{error}");
+            Vec::new()
+        });
+        Frame { scene: self.session.scene(), pictures }
+    }
+
+    fn navigate(&mut self, input: Input<'_>) {
+        self.session.navigate(input);
+    }
+
+    fn command(&mut self, command: Command) {
+        match command {
+            Command::NextViewpoint => self.turn_to(1),
+            Command::PreviousViewpoint => self.turn_to(-1),
+            Command::ResetNavigation => self.session.reset_navigation(),
+            Command::Reload => self.session.reload(),
+        }
+    }
+
+    fn files(&mut self) -> Option<Vec<PathBuf>> {
+        let files = self.session.files();
+        (files != self.watched).then(|| {
+            self.watched.clone_from(&files);
+            files
+        })
+    }
+
+    fn files_changed(&mut self, files: &[PathBuf]) {
+        tracing::info!("changed: {files:?}");
+        self.session.reload();
+        self.tell();
+    }
+
+    fn title(&self) -> String {
+        format!("{} - Umbriel", self.session.name())
+    }
+
+    fn screenshot(&mut self, name: &str, pixels: &RgbaPixels) {
+        let free = |n: u32| Some(PathBuf::from(format!("{}.{name}.{n:03}.png", self.session.name()))).filter(|p| !p.exists());
+        let Some(path) = (1..1000).find_map(free) else { return tracing::error!("a thousand screenshots are enough") };
+        match png::write(&path, pixels, "window") {
+            Ok(()) => tracing::info!("wrote {}", path.display()),
+            Err(error) => tracing::error!("{error}"),
+        }
+    }
+}
