@@ -45,3 +45,32 @@ impl Camera {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Frustum;
+    use glam::{Mat4, Vec3};
+
+    #[test]
+    fn rays_go_through_the_centres_of_sub_pixels() {
+        let frustum = Frustum { left: -2.0, right: 6.0, bottom: 0.0, top: 4.0, near: 2.0 };
+        let view_from_world = Mat4::from_translation(Vec3::new(-1.0, -2.0, -3.0));
+        let view = View { name: "window".into(), view_from_world, frustum, size: [4, 2] };
+        // At distance 1 the window spans -1..3 and 0..2: a pixel is a unit wide and high.
+        let rows = [
+            (1, [0, 0], vec![(-0.5, 1.5)]),
+            (1, [3, 1], vec![(2.5, 0.5)]),
+            (2, [1, 0], vec![(0.25, 1.75), (0.75, 1.75), (0.25, 1.25), (0.75, 1.25)]),
+        ];
+        for (sub_samples, pixel, expected) in rows {
+            let camera = Camera::new(&view, sub_samples).unwrap();
+            assert_eq!(camera.eye, DVec3::new(1.0, 2.0, 3.0));
+            let found: Vec<DVec3> = camera.directions(pixel).collect();
+            assert_eq!(found.len(), expected.len());
+            for (found, (x, y)) in found.iter().zip(expected) {
+                assert!(found.abs_diff_eq(DVec3::new(x, y, -1.0).normalize(), 1e-12), "{pixel:?}: {found} {x} {y}");
+            }
+        }
+    }
+}

@@ -53,6 +53,11 @@ impl Ray {
         Ray { origin, direction }
     }
 
+    /// The same ray from a later start.
+    pub(super) fn starting_at(&self, distance: f64) -> Ray {
+        Ray { origin: self.origin + self.direction * distance, direction: self.direction }
+    }
+
     /// Meets `triangle`, number `place` of the soup, at a positive distance.
     ///
     /// The three signed volumes change nothing but their sign when an edge is taken from the other side, so no ray slips

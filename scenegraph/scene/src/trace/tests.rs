@@ -212,7 +212,7 @@ fn alpha_masks_have_holes_for_the_eye_and_for_light() {
         "mirrored mask",
         &scene(vec![ground(10.0), masked(Mat4::from_scale(vec3(-1.0, 1.0, 1.0)))]),
         &light,
-        &[(under, left, LIT), (under, right, SHADOW)],
+        &[(under, left, LIT), (under, right, SHADOW), (under, vec3(-0.5, 0.0, 0.8), LIT), (under, vec3(0.5, 0.0, 0.8), SHADOW)],
     );
     let thin = |alpha: f32| {
         let pane = with(masked(Mat4::IDENTITY), |_, m| {
@@ -258,30 +258,36 @@ fn the_hierarchy_misses_nothing() {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f32 / (1 << 24) as f32 * 2.0 - 1.0
     };
+    let mut point = |scale: f32| vec3(random(), random(), random()) * scale;
     for (offset, reach) in [(0.0, 3.0), (1000.0, 3.0), (0.0, 100_000.0)] {
-        let mut point = |scale: f32| vec3(random(), random(), random()) * scale;
-        let positions: Vec<Vec3> = (0..400)
-            .flat_map(|_| {
-                let at = point(1.0);
+        let corners: Vec<[Vec3; 3]> = (0..400)
+            .map(|_| {
+                let at = point(1.0) + offset;
                 [at, at + point(0.2), at + point(0.2)]
             })
-            .map(|p| p + offset)
             .collect();
-        let tracer = Tracer::new(&scene(vec![drawable(mesh(positions, (0..1200).collect()), Mat4::IDENTITY)]));
+        let soup = mesh(corners.concat(), (0..1200).collect());
+        let tracer = Tracer::new(&scene(vec![drawable(soup, Mat4::IDENTITY)]));
         assert_eq!(tracer.triangle_count(), 400);
         let mut hits = 0;
-        for _ in 0..3000 {
-            let (origin, target) = (point(reach).as_dvec3() + f64::from(offset), point(1.0).as_dvec3() + f64::from(offset));
+        for ray in 0..4000 {
+            // Corners lie in the faces of their boxes, where rounding decides.
+            let [a, b, c] = corners[ray % 400].map(|p| p.as_dvec3());
+            let inside = (a + b + c) / 3.0;
+            let target = if ray % 2 == 0 { b.lerp(inside, 1e-6) } else { inside };
+            let origin = point(reach).as_dvec3() + f64::from(offset);
             let ray = Ray::new(origin, (target - origin).normalize());
-            let all = tracer.soup.triangles.iter().enumerate().filter_map(|(i, t)| ray.meets(i, t));
+            let start = tracer.soup.start(&ray).unwrap();
+            let all = tracer.soup.triangles.iter().enumerate().filter_map(|(i, t)| ray.starting_at(start).meets(i, t));
             let nearest = all.min_by(|a, b| a.distance.total_cmp(&b.distance));
+            let nearest = nearest.map(|hit| Hit { distance: hit.distance + start, ..hit });
             assert_eq!(tracer.soup.first(&ray, |_| true), nearest);
             let Some(nearest) = nearest else { continue };
             assert!(tracer.soup.any(&ray, nearest.distance + 1e-6, |_| true));
-            assert!(!tracer.soup.any(&ray, nearest.distance, |_| true));
+            assert!(!tracer.soup.any(&ray, nearest.distance - 1e-6, |_| true));
             hits += 1;
         }
-        assert!(hits > 500, "{hits}");
+        assert!(hits > 3900, "{hits}");
     }
 }
 

@@ -3,7 +3,7 @@
 use super::alpha::Cutout;
 use super::ray::{Hit, Ray, Triangle};
 use crate::{AlphaMode, Drawable, Scene, Topology, deformed};
-use glam::{DVec3, Vec3, Vec3A};
+use glam::{DVec3, Vec3};
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::ray::{Ray as BoxRay, RayHit};
 use obvhs::{BvhBuildParams, aabb::Aabb as Box3};
@@ -107,24 +107,26 @@ impl Soup {
     /// The nearest hit that `counts`.
     pub(super) fn first(&self, ray: &Ray, counts: impl Fn(&Hit) -> bool) -> Option<Hit> {
         let start = self.start(ray)?;
+        let ray = ray.starting_at(start);
         let mut best: Option<Hit> = None;
-        self.bvh.ray_traverse(box_ray(ray, start, f64::INFINITY), &mut RayHit::none(), |_, place| {
+        self.bvh.ray_traverse(box_ray(&ray, f64::INFINITY), &mut RayHit::none(), |_, place| {
             let hit = ray.meets(place, &self.triangles[place]);
             match hit.filter(|h| best.is_none_or(|b| h.distance < b.distance) && counts(h)) {
                 Some(hit) => {
                     best = Some(hit);
-                    ((hit.distance - start + self.slack) as f32).next_up()
+                    ((hit.distance + self.slack) as f32).next_up()
                 }
                 None => f32::INFINITY,
             }
         });
-        best
+        best.map(|hit| Hit { distance: hit.distance + start, ..hit })
     }
 
     /// Is there a hit that `counts` before the distance `far`?
     pub(super) fn any(&self, ray: &Ray, far: f64, counts: impl Fn(&Hit) -> bool) -> bool {
         let Some(start) = self.start(ray).filter(|start| *start < far) else { return false };
-        !self.bvh.ray_traverse_miss(box_ray(ray, start, far + self.slack), |_, place| {
+        let (ray, far) = (ray.starting_at(start), far - start);
+        !self.bvh.ray_traverse_miss(box_ray(&ray, far + self.slack), |_, place| {
             let hit = ray.meets(place, &self.triangles[place]);
             if hit.is_some_and(|h| h.distance < far && counts(&h)) { f32::NEG_INFINITY } else { f32::INFINITY }
         })
@@ -138,9 +140,9 @@ impl Soup {
         cutout.is_there(triangle.place, if triangle.mirrored { [a, c, b] } else { [a, b, c] })
     }
 
-    /// Distance at which the ray enters the bounds: the hierarchy's single precision is spent on what is inside. `None`
+    /// Distance at which the ray enters the bounds, from where it is followed: an eye far away costs no precision. `None`
     /// where it misses them or is no ray.
-    fn start(&self, ray: &Ray) -> Option<f64> {
+    pub(super) fn start(&self, ray: &Ray) -> Option<f64> {
         if self.triangles.is_empty() || !ray.origin.is_finite() || !ray.direction.is_finite() {
             return None;
         }
@@ -163,7 +165,6 @@ impl Soup {
     }
 }
 
-fn box_ray(ray: &Ray, start: f64, far: f64) -> BoxRay {
-    let direction: Vec3A = ray.direction.as_vec3a();
-    BoxRay::new((ray.origin + ray.direction * start).as_vec3a(), direction, 0.0, ((far - start) as f32).next_up())
+fn box_ray(ray: &Ray, far: f64) -> BoxRay {
+    BoxRay::new(ray.origin.as_vec3a(), ray.direction.as_vec3a(), 0.0, (far as f32).next_up())
 }
