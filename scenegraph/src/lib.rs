@@ -9,6 +9,7 @@
 
 pub mod extract;
 pub mod geometry;
+pub mod gltf;
 pub mod nodes;
 
 pub use extract::{ExtractStats, Extractor, Problem, Viewpoint};

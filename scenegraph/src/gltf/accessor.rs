@@ -117,7 +117,8 @@ impl<'a> Accessors<'a> {
         let needed = (count - 1).checked_mul(stride).and_then(|n| n.checked_add(size)).and_then(|n| n.checked_add(offset));
         if needed.is_none_or(|needed| needed > view.length()) {
             let needed = needed.map_or("more than all".to_owned(), |n| n.to_string());
-            let message = format!("needs {needed} bytes for {count} elements, but bufferView {} has {}", view.index(), view.length());
+            let message =
+                format!("needs {needed} bytes for {count} elements, but bufferView {} has {}", view.index(), view.length());
             return Err(Fault::data(object, message));
         }
         self.budget.take((count * size) as u64, object)?;
@@ -196,14 +197,35 @@ mod tests {
     #[test]
     fn integers_and_floats() {
         let scalar = [Dimensions::Scalar];
-        let sparse = r#","sparse":{"count":3,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":0,"byteOffset":20}}"#;
+        let sparse =
+            r#","sparse":{"count":3,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":0,"byteOffset":20}}"#;
         for (accessor, view, floats, integers) in [
             (r#""bufferView":0,"componentType":5121,"count":3,"type":"SCALAR""#.to_owned(), "", vec![0., 1., 2.], vec![0, 1, 2]),
-            (r#""bufferView":0,"componentType":5121,"count":3,"type":"SCALAR""#.into(), r#","byteStride":4"#, vec![0., 4., 8.], vec![0, 4, 8]),
-            (r#""bufferView":0,"byteOffset":30,"componentType":5123,"count":1,"type":"SCALAR""#.into(), "", vec![7966.], vec![0x1f1e]),
+            (
+                r#""bufferView":0,"componentType":5121,"count":3,"type":"SCALAR""#.into(),
+                r#","byteStride":4"#,
+                vec![0., 4., 8.],
+                vec![0, 4, 8],
+            ),
+            (
+                r#""bufferView":0,"byteOffset":30,"componentType":5123,"count":1,"type":"SCALAR""#.into(),
+                "",
+                vec![7966.],
+                vec![0x1f1e],
+            ),
             (r#""componentType":5121,"count":2,"type":"SCALAR""#.into(), "", vec![0., 0.], vec![0, 0]),
-            (format!(r#""componentType":5121,"count":5,"type":"SCALAR"{sparse}"#), "", vec![0., 20., 21., 22., 0.], vec![0, 20, 21, 22, 0]),
-            (format!(r#""bufferView":0,"componentType":5121,"count":4,"type":"SCALAR"{sparse}"#), "", vec![0., 20., 21., 22.], vec![0, 20, 21, 22]),
+            (
+                format!(r#""componentType":5121,"count":5,"type":"SCALAR"{sparse}"#),
+                "",
+                vec![0., 20., 21., 22., 0.],
+                vec![0, 20, 21, 22, 0],
+            ),
+            (
+                format!(r#""bufferView":0,"componentType":5121,"count":4,"type":"SCALAR"{sparse}"#),
+                "",
+                vec![0., 20., 21., 22.],
+                vec![0, 20, 21, 22],
+            ),
         ] {
             let source = source(&accessor, view);
             let (budget, a) = (Budget::new(1000), source.document.accessors().next().unwrap());
@@ -229,14 +251,30 @@ mod tests {
     #[test]
     fn faults() {
         for (accessor, view, message) in [
-            (r#""bufferView":0,"componentType":5121,"count":33,"type":"SCALAR""#, "", "needs 33 bytes for 33 elements, but bufferView 0 has 32"),
+            (
+                r#""bufferView":0,"componentType":5121,"count":33,"type":"SCALAR""#,
+                "",
+                "needs 33 bytes for 33 elements, but bufferView 0 has 32",
+            ),
             (r#""bufferView":0,"componentType":5126,"count":3,"type":"SCALAR""#, r#","byteStride":16"#, "needs 36 bytes"),
-            (r#""bufferView":0,"byteOffset":18446744073709551615,"componentType":5121,"count":2,"type":"SCALAR""#, "", "more than all"),
+            (
+                r#""bufferView":0,"byteOffset":18446744073709551615,"componentType":5121,"count":2,"type":"SCALAR""#,
+                "",
+                "more than all",
+            ),
             (r#""bufferView":0,"componentType":5126,"count":18446744073709551615,"type":"SCALAR""#, "", "more than all"),
             (r#""componentType":5121,"count":1000000000000,"type":"SCALAR""#, "", "needs 1000000000000 bytes"),
             (r#""bufferView":0,"componentType":5126,"count":1,"type":"VEC2","name":"uv""#, "", "accessor 0 'uv': holds F32 Vec2"),
-            (r#""componentType":5121,"count":3,"type":"SCALAR","sparse":{"count":3,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":0}}"#, "", "sparse index 3 is outside of its 3"),
-            (r#""componentType":5121,"count":9,"type":"SCALAR","sparse":{"count":4,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":0}}"#, "", "sparse indices: needs 4 bytes"),
+            (
+                r#""componentType":5121,"count":3,"type":"SCALAR","sparse":{"count":3,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":0}}"#,
+                "",
+                "sparse index 3 is outside of its 3",
+            ),
+            (
+                r#""componentType":5121,"count":9,"type":"SCALAR","sparse":{"count":4,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":0}}"#,
+                "",
+                "sparse indices: needs 4 bytes",
+            ),
         ] {
             let source = source(accessor, view);
             let (budget, a) = (Budget::new(1000), source.document.accessors().next().unwrap());

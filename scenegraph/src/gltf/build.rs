@@ -1,9 +1,9 @@
 //! Makes the nodes of a model: scenes, transforms, shapes, skins.
 
+use super::Model;
 use super::content::{Content, target_count};
 use super::error::{Cause, Fault};
 use super::surface::Surface;
-use super::Model;
 use glam::{Mat4, Quat, Vec3};
 use gltf::scene::Transform;
 use std::collections::{HashMap, HashSet};
@@ -159,9 +159,7 @@ impl<'a> Builder<'a> {
         self.set(id, "topology", surface.topology.name())?;
         self.set(id, "position", surface.position.clone())?;
         self.set(id, "index", surface.index.clone())?;
-        for (field, values) in [("normal", &surface.normal)] {
-            self.set_some(id, field, values)?;
-        }
+        self.set_some(id, "normal", &surface.normal)?;
         for (field, values) in [("tangent", &surface.tangent), ("color", &surface.color), ("weight", &surface.weight)] {
             self.set_some(id, field, values)?;
         }
@@ -236,7 +234,8 @@ impl<'a> Builder<'a> {
                 let mut ancestors = std::iter::successors(parents[node], |p| parents[*p]);
                 if ancestors.any(|p| listed.contains(&p)) {
                     let object = super::error::label("scene", scene.index(), scene.name());
-                    self.warnings.push(format!("{object}: node {node} is also below another of its nodes; it is shown there only"));
+                    self.warnings
+                        .push(format!("{object}: node {node} is also below another of its nodes; it is shown there only"));
                 } else if !roots.contains(&self.transforms[node]) {
                     roots.push(self.transforms[node]);
                 }

@@ -1,10 +1,10 @@
 //! Materials and textures of a model.
 
 use super::build::{Builder, color};
+use super::container::UvTransform;
 use super::error::{Fault, label};
 use glam::{Vec2, Vec3, Vec4};
 use gltf::material::{AlphaMode, Material};
-use super::container::UvTransform;
 use gltf::texture::{Info, MagFilter, MinFilter, Texture, WrappingMode};
 use std::collections::HashMap;
 use umbriel_fields::NodeId;
@@ -113,7 +113,8 @@ impl Builder<'_> {
         let (base, metallic, roughness, base_texture) = match material.pbr_specular_glossiness() {
             Some(sg) => {
                 let object = label("material", material.index().unwrap_or(0), material.name());
-                let lost = if sg.specular_glossiness_texture().is_some() { " without its specular-glossiness texture" } else { "" };
+                let lost =
+                    if sg.specular_glossiness_texture().is_some() { " without its specular-glossiness texture" } else { "" };
                 self.warnings.push(format!("{object}: KHR_materials_pbrSpecularGlossiness is approximated{lost}"));
                 let diffuse = Vec4::from_array(sg.diffuse_factor());
                 let (base, metallic) = metal_from_specular(diffuse.truncate(), Vec3::from_array(sg.specular_factor()));

@@ -17,7 +17,7 @@ impl Builder<'_> {
         self.set(view, "description", name.unwrap_or_default())?;
         let near = match camera.projection() {
             Projection::Perspective(p) => {
-                self.set(view, "field_of_view", p.yfov().clamp(0.001, 3.14))?;
+                self.set(view, "field_of_view", p.yfov().clamp(0.001, 3.1))?;
                 p.znear()
             }
             Projection::Orthographic(o) => {

@@ -146,7 +146,8 @@ fn drop_unreadable(root: &mut Value) {
     let Some(animations) = root.get_mut("animations").and_then(Value::as_array_mut) else { return };
     for animation in animations {
         if let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) {
-            channels.retain(|c| c.get("target").is_none_or(|t| t.get("node").is_some() && t.get("path") != Some(&"pointer".into())));
+            channels
+                .retain(|c| c.get("target").is_none_or(|t| t.get("node").is_some() && t.get("path") != Some(&"pointer".into())));
         }
     }
 }
@@ -154,7 +155,8 @@ fn drop_unreadable(root: &mut Value) {
 /// Gives textures whose only picture is in a format of an extension an image that cannot be had, which is warned about.
 fn give_sources(root: &mut Value) {
     let Some(textures) = root.get("textures").and_then(Value::as_array) else { return };
-    let without: Vec<usize> = (0..textures.len()).filter(|t| textures[*t].is_object() && textures[*t].get("source").is_none()).collect();
+    let without: Vec<usize> =
+        (0..textures.len()).filter(|t| textures[*t].is_object() && textures[*t].get("source").is_none()).collect();
     let images = root.get("images").and_then(Value::as_array).map_or(0, Vec::len);
     if without.is_empty() {
         return;
@@ -207,7 +209,8 @@ mod tests {
             let e = parse(json.as_bytes()).unwrap_err().to_string();
             assert!(e.contains(message), "{json}: {e}");
         }
-        let ignored = r#"{"asset":{"version":"2.0"},"animations":[{"samplers":[],"channels":[{"sampler":0,"target":{"path":"scale"}}]}]}"#;
+        let ignored =
+            r#"{"asset":{"version":"2.0"},"animations":[{"samplers":[],"channels":[{"sampler":0,"target":{"path":"scale"}}]}]}"#;
         assert!(parse(ignored.as_bytes()).unwrap().root.animations[0].channels.is_empty());
     }
 

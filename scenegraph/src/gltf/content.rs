@@ -1,13 +1,13 @@
 //! All that a model file holds as plain, checked data: whatever can be wrong with a file is found here, before the
 //! graph is touched.
 
+use super::LoadOptions;
 use super::accessor::{Accessors, name_of};
 use super::budget::Budget;
 use super::error::{Fault, label};
 use super::read::{Source, read};
 use super::surface::{Surface, Surfaces};
 use super::tracks::{Animation, read_animations};
-use super::LoadOptions;
 use glam::Mat4;
 use gltf::accessor::Dimensions;
 use std::path::Path;
@@ -85,7 +85,11 @@ fn check_shapes(source: &Source, meshes: &[Vec<Option<Surface>>], budget: &Budge
         let Some(skin) = node.skin() else { continue };
         let joints = skin.joints().len();
         if let Some(last) = surfaces.iter().flatten().filter_map(|s| s.last_joint).max().filter(|last| *last >= joints) {
-            let message = format!("{} has weights for joint {last}, but {} has {joints} joints", label("mesh", mesh.index(), mesh.name()), label("skin", skin.index(), skin.name()));
+            let message = format!(
+                "{} has weights for joint {last}, but {} has {joints} joints",
+                label("mesh", mesh.index(), mesh.name()),
+                label("skin", skin.index(), skin.name())
+            );
             return Err(Fault::data(object(), message));
         }
     }

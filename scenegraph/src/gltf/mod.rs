@@ -30,8 +30,8 @@ mod tracks;
 mod uri;
 
 use content::Content;
-pub use error::{Cause, Error};
 use error::Fault;
+pub use error::{Cause, Error};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use umbriel_fields::{Graph, NodeId};
@@ -95,4 +95,15 @@ fn guard<T>(work: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
         let message = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|s| s.to_string()));
         Err(Fault::new("", Cause::Internal(message.unwrap_or_default())))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panics_become_errors() {
+        let fault = guard(|| -> Result<(), Fault> { panic!("{} is missing", "wheel") }).unwrap_err();
+        assert_eq!(fault.in_file(Path::new("car.glb")).to_string(), "car.glb: the importer failed: wheel is missing");
+    }
 }

@@ -2,9 +2,9 @@
 
 use super::LoadOptions;
 use super::budget::Budget;
+use super::container::{Parsed, UvTransform};
 use super::error::{Cause, Fault, label, shorten};
 use super::uri::Place;
-use super::container::{Parsed, UvTransform};
 use super::{check, container};
 use gltf::Document;
 use gltf::json::{self, Root};
@@ -70,9 +70,9 @@ fn read_buffers(
     for (i, buffer) in root.buffers.iter().enumerate() {
         let object = label("buffer", i, buffer.name.as_deref());
         let bytes = match (&buffer.uri, &binary) {
-            (Some(uri), _) => place
-                .read(uri, budget.left())
-                .map_err(|why| Fault::new(object.clone(), Cause::Uri { uri: shorten(uri), why }))?,
+            (Some(uri), _) => {
+                place.read(uri, budget.left()).map_err(|why| Fault::new(object.clone(), Cause::Uri { uri: shorten(uri), why }))?
+            }
             (None, Some(range)) if i == 0 => file[range.clone()].to_vec(),
             (None, _) => {
                 let compressed = root.extensions_used.iter().find(|e| e.contains("compression"));

@@ -76,12 +76,22 @@ impl<'a> Surfaces<'a> {
         let surface = Surface {
             topology,
             normal: self.attribute3(&part, primitive.get(&Semantic::Normals), Vec3::Y)?,
-            tangent: self.attribute4(&part, primitive.get(&Semantic::Tangents), &[Dimensions::Vec4], Vec4::new(1.0, 0.0, 0.0, 1.0))?,
+            tangent: self.attribute4(
+                &part,
+                primitive.get(&Semantic::Tangents),
+                &[Dimensions::Vec4],
+                Vec4::new(1.0, 0.0, 0.0, 1.0),
+            )?,
             tex_coord: [
                 self.attribute2(&part, primitive.get(&Semantic::TexCoords(0)))?,
                 self.attribute2(&part, primitive.get(&Semantic::TexCoords(1)))?,
             ],
-            color: self.attribute4(&part, primitive.get(&Semantic::Colors(0)), &[Dimensions::Vec3, Dimensions::Vec4], Vec4::ONE)?,
+            color: self.attribute4(
+                &part,
+                primitive.get(&Semantic::Colors(0)),
+                &[Dimensions::Vec3, Dimensions::Vec4],
+                Vec4::ONE,
+            )?,
             joint,
             weight,
             last_joint,
@@ -97,7 +107,8 @@ impl<'a> Surfaces<'a> {
         match indices.iter().position(|[i]| *i as usize >= vertices) {
             None => Ok(indices.into_iter().map(|[i]| i as i32).collect()),
             Some(place) => {
-                let message = format!("index {} at place {place} is outside of the {vertices} vertices of {object}", indices[place][0]);
+                let message =
+                    format!("index {} at place {place} is outside of the {vertices} vertices of {object}", indices[place][0]);
                 Err(Fault::data(name_of(accessor), message))
             }
         }

@@ -48,7 +48,8 @@ pub(crate) fn expand(mode: Mode, mut given: Vec<i32>) -> (Topology, Vec<i32>, us
         }
         Mode::TriangleStrip => {
             // Every second triangle is turned, so that all face the same side.
-            let turned = given.windows(3).enumerate().flat_map(|(i, t)| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[0], t[2], t[1]] });
+            let turned =
+                given.windows(3).enumerate().flat_map(|(i, t)| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[0], t[2], t[1]] });
             (Topology::Triangles, turned.collect(), at_least(3, &given))
         }
         Mode::TriangleFan => {
