@@ -6,6 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec4};
 use std::sync::Arc;
 use umbriel_scene::Aabb;
+use wgpu::util::DeviceExt;
 
 /// WGSL of this pass: the shared ways from vertices to the screen, then its own.
 pub(super) const SHADER: &str = concat!(include_str!("../shaders/position.wgsl"), include_str!("extract.wgsl"));
@@ -161,10 +162,11 @@ impl Extract {
     }
 
     /// Runs both steps for all `stale` lists.
-    pub(super) fn run(&self, encoder: &mut wgpu::CommandEncoder, stale: &[&Lists]) {
+    pub(super) fn run(&self, device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder, stale: &[&Lists]) {
         if stale.is_empty() {
             return;
         }
+        start_anew(device, encoder, stale);
         let mut pass =
             encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("volume extraction"), timestamp_writes: None });
         for (pipeline, count) in
@@ -182,13 +184,7 @@ impl Extract {
 
     /// Lists for `wanted`, in the buffers of `old` where these fit. The flag says whether they must be made anew by
     /// [`Extract::run`]. `None` where the device cannot hold them.
-    pub(super) fn lists(
-        &self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        wanted: &Wanted<'_>,
-        old: Option<Lists>,
-    ) -> Option<(Lists, bool)> {
+    pub(super) fn lists(&self, device: &wgpu::Device, wanted: &Wanted<'_>, old: Option<Lists>) -> Option<(Lists, bool)> {
         let key = Key {
             uniform: CasterUniform::new(
                 wanted.light,
@@ -217,8 +213,6 @@ impl Extract {
                 self.allocate(device, wanted, key, &capacity)
             }
         };
-        queue.write_buffer(&lists.uniform, 0, bytemuck::bytes_of(&lists.key.uniform));
-        queue.write_buffer(&lists.draws, 0, bytemuck::cast_slice(&capacity.empty_draws()));
         Some((lists, true))
     }
 
@@ -229,7 +223,7 @@ impl Extract {
         };
         let uniform = buffer("volume caster", size_of::<CasterUniform>() as u64, U::UNIFORM | U::COPY_DST);
         let casts = buffer("volume casts", 4 * u64::from(wanted.part.triangle_count), U::STORAGE);
-        let draws = buffer("volume draws", 3 * DRAW_SIZE, U::STORAGE | U::INDIRECT | U::COPY_DST | U::COPY_SRC);
+        let draws = buffer("volume draws", 3 * DRAW_SIZE, U::STORAGE | U::INDIRECT | U::COPY_DST);
         let indices = buffer("volume indices", capacity.bytes(), U::STORAGE | U::INDEX);
         let (bind_group, placed) = self.bind_groups(device, wanted, [&uniform, &casts, &draws, &indices]);
         let local_light = wanted.light.toward_light.w != 0.0;
@@ -253,6 +247,28 @@ impl Extract {
         let part = wanted.part;
         let all = [uniform, wanted.positions, &part.triangles, &part.edges, &part.incidences, casts, draws, indices];
         (bind(&self.layout, &all), bind(&self.placed_layout, &[uniform, wanted.positions]))
+    }
+}
+
+/// Fills uniforms and empties lists: one upload for all, since many small writes cost more than the lists themselves.
+fn start_anew(device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder, stale: &[&Lists]) {
+    const UNIFORM: u64 = size_of::<CasterUniform>() as u64;
+    let mut contents = Vec::with_capacity(stale.len() * (UNIFORM + 3 * DRAW_SIZE) as usize);
+    for lists in stale {
+        contents.extend_from_slice(bytemuck::bytes_of(&lists.key.uniform));
+        contents.extend_from_slice(bytemuck::cast_slice(&Capacity::new(&lists.part, lists.local_light).empty_draws()));
+    }
+    let upload = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("volume upload"),
+        contents: &contents,
+        usage: wgpu::BufferUsages::COPY_SRC,
+    });
+    let mut at = 0;
+    for lists in stale {
+        for (buffer, size) in [(&lists.uniform, UNIFORM), (&lists.draws, 3 * DRAW_SIZE)] {
+            encoder.copy_buffer_to_buffer(&upload, at, buffer, 0, size);
+            at += size;
+        }
     }
 }
 

@@ -93,14 +93,9 @@ impl VolumePass {
         }
     }
 
-    /// Makes the lists of every job. Once per submission, before the passes that draw them.
-    pub fn prepare(
-        &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        encoder: &mut wgpu::CommandEncoder,
-        jobs: &[VolumeJob],
-    ) -> VolumeStats {
+    /// Makes the lists of every job, in the encoder of the passes that draw them and before these; jobs are then drawn by
+    /// their place in `jobs`.
+    pub fn prepare(&mut self, device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder, jobs: &[VolumeJob]) -> VolumeStats {
         let mut stats = VolumeStats::default();
         let mut stale = Vec::new();
         let mut old_jobs = std::mem::take(&mut self.jobs).into_iter();
@@ -124,7 +119,7 @@ impl VolumePass {
                         bounds_in_world: &caster.bounds_in_world,
                         vertex_count,
                     };
-                    match self.extract.lists(device, queue, &wanted, old.take(part)) {
+                    match self.extract.lists(device, &wanted, old.take(part)) {
                         Some((made, anew)) => {
                             if anew {
                                 stale.push((j, lists.len()));
@@ -141,7 +136,7 @@ impl VolumePass {
             self.jobs.push(lists);
         }
         let stale: Vec<&Lists> = stale.into_iter().map(|(job, place)| &self.jobs[job][place]).collect();
-        self.extract.run(encoder, &stale);
+        self.extract.run(device, encoder, &stale);
         self.meshes.forget_dead();
         stats
     }

@@ -157,7 +157,7 @@ impl Gpu {
         let colour = self.texture(view, COLOUR).create_view(&Default::default());
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let job = VolumeJob { light, casters: casters.iter().map(Loaded::caster).collect() };
-        let stats = self.pass.prepare(&self.device, &self.queue, &mut encoder, &[job]);
+        let stats = self.pass.prepare(&self.device, &mut encoder, &[job]);
         self.surfaces(&mut encoder, casters.iter().chain(receivers), &view_group, &target_view);
         {
             let colours = [(self.samples > 1).then_some(wgpu::RenderPassColorAttachment {
