@@ -71,6 +71,7 @@ impl Extractor {
     /// Without a list of changes everything is read anew; what is unchanged keeps its meshes and materials.
     fn gather_all(&mut self, graph: &Graph, dirty: &mut Dirty) {
         dirty.everything();
+        self.instances = Default::default();
         self.known.clear();
         self.globals = Default::default();
         for node in graph.nodes() {

@@ -1,6 +1,6 @@
 //! The scene's list of drawables: a shape keeps its place as long as it stands where it stands.
 
-use super::instance::{Instances, NONE};
+use super::instance::{Instance, Instances, NONE};
 use super::role::Role;
 use super::shape::Shapes;
 use super::skin::Bindings;
@@ -25,20 +25,28 @@ impl Slots {
     /// Gives every shape of a newly compiled list its place: the one it had, else a free one. Returns the places that
     /// were given up.
     pub(super) fn assign(&mut self, instances: &mut Instances) -> Vec<u32> {
-        let mut old = std::mem::take(&mut self.by_shape);
         self.places.fill(NONE);
+        let mut standings: SecondaryMap<NodeId, usize> = SecondaryMap::new();
         let mut homeless = Vec::new();
-        let shapes: Vec<u32> = (0..instances.list.len() as u32).filter(|i| instances.at(*i).role == Role::Shape).collect();
-        for place in &shapes {
-            let node = instances.at(*place).node;
-            // Places are kept per shape, oldest first, so the n-th standing keeps the n-th place.
-            let kept = old.get_mut(node).filter(|places| !places.is_empty()).map(|places| places.remove(0));
-            match kept {
-                Some(slot) => self.give(instances, *place, slot),
-                None => homeless.push(*place),
+        for place in 0..instances.list.len() as u32 {
+            let Instance { node, role, .. } = instances.list[place as usize];
+            if role != Role::Shape {
+                continue;
+            }
+            // The n-th standing of a shape keeps the shape's n-th place.
+            let nth = standings.insert(node, 0).unwrap_or(0);
+            standings.insert(node, nth + 1);
+            match self.by_shape.get(node).and_then(|places| places.get(nth)) {
+                Some(slot) => give(&mut self.places, instances, place, *slot),
+                None => homeless.push(place),
             }
         }
-        let given_up: Vec<u32> = old.values().flatten().copied().collect();
+        let mut given_up = Vec::new();
+        self.by_shape.retain(|node, places| {
+            let kept = standings.get(node).copied().unwrap_or(0).min(places.len());
+            given_up.extend(places.drain(kept..));
+            kept > 0
+        });
         self.free.extend(&given_up);
         self.free.sort_unstable_by(|a, b| b.cmp(a));
         for place in homeless {
@@ -46,18 +54,12 @@ impl Slots {
                 self.places.push(NONE);
                 self.places.len() as u32 - 1
             });
-            self.give(instances, place, slot);
+            give(&mut self.places, instances, place, slot);
+            if let Some(entry) = self.by_shape.entry(instances.at(place).node) {
+                entry.or_default().push(slot);
+            }
         }
         given_up.into_iter().filter(|slot| self.places[*slot as usize] == NONE).collect()
-    }
-
-    fn give(&mut self, instances: &mut Instances, place: u32, slot: u32) {
-        let instance = &mut instances.list[place as usize];
-        instance.slot = slot;
-        self.places[slot as usize] = place;
-        if let Some(entry) = self.by_shape.entry(instance.node) {
-            entry.or_default().push(slot);
-        }
     }
 
     /// Makes the scene's list as long as needed. New places are vacant.
@@ -128,6 +130,11 @@ impl Slots {
         }
         Written { changed: true, casting }
     }
+}
+
+fn give(places: &mut [u32], instances: &mut Instances, place: u32, slot: u32) {
+    instances.list[place as usize].slot = slot;
+    places[slot as usize] = place;
 }
 
 /// What writing a drawable did.

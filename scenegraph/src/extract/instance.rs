@@ -1,10 +1,11 @@
 //! The compiled list: one entry per path from the world to a node, parents before children, sub-trees contiguous.
 
 use super::read::{Reader, label};
-use super::role::{Role, Types};
+use super::role::{Role, TypeInfo, Types};
 use glam::{Mat4, Quat, Vec3};
 use slotmap::SecondaryMap;
 use std::collections::HashSet;
+use std::sync::Arc;
 use umbriel_fields::{Graph, NodeId};
 
 /// No entry.
@@ -74,8 +75,15 @@ struct Open {
     next: usize,
 }
 
-/// Walks the graph from `root`, without recursion, and lists every path. Stops at `limit` entries.
-pub(super) fn compile(graph: &Graph, types: &mut Types, root: Option<NodeId>, limit: usize) -> (Instances, CompileProblems) {
+/// Walks the graph from `root`, without recursion, and lists every path. Stops at `limit` entries. Nodes that stand in
+/// `before` keep their local transforms: those written since are read again by the caller.
+pub(super) fn compile(
+    graph: &Graph,
+    types: &mut Types,
+    root: Option<NodeId>,
+    limit: usize,
+    before: &Instances,
+) -> (Instances, CompileProblems) {
     let mut out = Instances::default();
     let mut problems = CompileProblems::default();
     let mut last: SecondaryMap<NodeId, u32> = SecondaryMap::new();
@@ -86,8 +94,8 @@ pub(super) fn compile(graph: &Graph, types: &mut Types, root: Option<NodeId>, li
     loop {
         if let Some((node, parent, ordinal)) = pending.take() {
             let type_place = types.of(graph, node);
-            let role = types.get(type_place).role;
-            if !role.is_placed() {
+            let info = types.get(type_place);
+            if !info.role.is_placed() {
                 continue;
             }
             if out.list.len() >= limit {
@@ -101,9 +109,9 @@ pub(super) fn compile(graph: &Graph, types: &mut Types, root: Option<NodeId>, li
                 Some(before) => out.list[before as usize].next = place,
                 None => drop(out.first.insert(node, place)),
             }
-            out.list.push(new_instance(graph, types, node, type_place, parent, ordinal));
+            out.list.push(new_instance(graph, info, node, parent, ordinal, before));
             on_path.insert(node, ());
-            open.push(Open { place, branches: branches(graph, node, role), next: 0 });
+            open.push(Open { place, branches: branches(graph, node, info), next: 0 });
         }
         let Some(top) = open.last_mut() else { break };
         let Some(&(ordinal, child)) = top.branches.get(top.next) else {
@@ -131,8 +139,14 @@ pub(super) fn compile(graph: &Graph, types: &mut Types, root: Option<NodeId>, li
     (out, problems)
 }
 
-fn new_instance(graph: &Graph, types: &Types, node: NodeId, type_place: u16, parent: u32, ordinal: i32) -> Instance {
-    let info = types.get(type_place);
+fn new_instance(graph: &Graph, info: &TypeInfo, node: NodeId, parent: u32, ordinal: i32, before: &Instances) -> Instance {
+    let (parent_from_local, choice) = match before.of(node).next().map(|place| before.at(place)) {
+        Some(old) => (old.parent_from_local, old.choice),
+        None => (
+            info.transform.map_or(Mat4::IDENTITY, |keys| local_matrix(graph, node, keys)),
+            if info.role == Role::Switch { switch_choice(graph, node) } else { ALL },
+        ),
+    };
     Instance {
         node,
         role: info.role,
@@ -140,12 +154,12 @@ fn new_instance(graph: &Graph, types: &Types, node: NodeId, type_place: u16, par
         end: 0,
         next: NONE,
         ordinal,
-        choice: if info.role == Role::Switch { switch_choice(graph, node) } else { ALL },
+        choice,
         slot: NONE,
         joint: false,
         shown: true,
         finite: true,
-        parent_from_local: info.transform.map_or(Mat4::IDENTITY, |keys| local_matrix(graph, node, keys)),
+        parent_from_local,
         room_from_local: Mat4::IDENTITY,
     }
 }
@@ -156,13 +170,13 @@ pub(super) fn switch_choice(graph: &Graph, node: NodeId) -> i32 {
 }
 
 /// Children in order, then a StencilShadow's casters that do not stand below its children anyway.
-fn branches(graph: &Graph, node: NodeId, role: Role) -> Vec<(i32, NodeId)> {
-    if matches!(role, Role::Shape | Role::Light | Role::Viewpoint) {
-        return Vec::new();
-    }
+fn branches(graph: &Graph, node: NodeId, info: &TypeInfo) -> Vec<(i32, NodeId)> {
+    let Some(children) = info.children else { return Vec::new() };
     let reader = Reader::new(graph, node);
-    let mut out: Vec<(i32, NodeId)> = reader.nodes("children").into_iter().map(|(i, id)| (i as i32, id)).collect();
-    if role == Role::Stencil {
+    let children: Arc<[Option<NodeId>]> = reader.at(children);
+    let living = |(i, id): (i32, &Option<NodeId>)| id.filter(|id| graph.contains(*id)).map(|id| (i, id));
+    let mut out: Vec<(i32, NodeId)> = (0..).zip(children.iter()).filter_map(living).collect();
+    if info.role == Role::Stencil {
         let casters = reader.nodes("caster");
         let below = if casters.is_empty() { HashSet::new() } else { all_below(graph, &out) };
         for (_, caster) in casters {

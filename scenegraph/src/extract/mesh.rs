@@ -24,6 +24,7 @@ pub(super) struct CachedMesh {
 
 /// What makes a solid: kind and numbers. Equal solids share one mesh and so are drawn as instances.
 type SolidKey = (&'static str, [u32; 3], [bool; 3], u32);
+type MakeSolid = Box<dyn Fn() -> Mesh>;
 
 /// Meshes by geometry node; an `Arc` stays the same as long as no node it was made of is written.
 #[derive(Default)]
@@ -78,7 +79,7 @@ impl Meshes {
     }
 }
 
-fn solid(kind: &str, read: &Reader<'_>) -> Result<(SolidKey, Box<dyn Fn() -> Mesh>), String> {
+fn solid(kind: &str, read: &Reader<'_>) -> Result<(SolidKey, MakeSolid), String> {
     let part = |field: &str| read.get::<bool>(field);
     let segments = |least: i32, most: i32| read.get::<i32>("segments").clamp(least, most) as u32;
     match kind {

@@ -173,7 +173,7 @@ impl Extractor {
 
     /// The place of a light node in [`Scene::lights`]; None if it is off, hidden or no light of the world.
     pub fn light_of(&self, node: NodeId) -> Option<usize> {
-        self.instances.of(node).find_map(|place| self.lights.get(self.instances.at(place).slot as usize)?.slot)
+        light_slot(&self.instances, &self.lights, node)
     }
 
     /// The places in [`Scene::drawables`] of all shapes at and below a node, in tree order.
@@ -215,7 +215,7 @@ impl Extractor {
 
     /// Compiles the list anew. Shapes that stay keep their places, meshes and materials.
     fn recompile(&mut self, graph: &Graph, scene: &mut Scene, dirty: &mut Dirty) {
-        let (instances, found) = compile(graph, &mut self.types, self.world, self.limit);
+        let (instances, found) = compile(graph, &mut self.types, self.world, self.limit, &self.instances);
         self.instances = instances;
         let problems = &mut self.resources.problems;
         problems.sweep(graph);
@@ -371,7 +371,13 @@ impl Extractor {
 
     fn stencil_groups(&mut self, graph: &Graph, scene: &Scene) -> Vec<StencilGroup> {
         let Extractor { instances, groups, lights, resources, .. } = self;
-        let light_of = |node| instances.of(node).find_map(|place| lights.get(instances.at(place).slot as usize)?.slot);
+        let light_of = |node| light_slot(instances, lights, node);
         stencil::read_groups(graph, instances, groups, scene, light_of, &mut resources.problems)
     }
+}
+
+/// The place in the scene's lights of the first standing of a light that shines.
+fn light_slot(instances: &Instances, lights: &[LightEntry], node: NodeId) -> Option<usize> {
+    let standings = instances.of(node).map(|place| instances.at(place)).filter(|i| i.role == Role::Light);
+    standings.into_iter().find_map(|i| lights[i.slot as usize].slot)
 }

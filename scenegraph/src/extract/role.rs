@@ -38,6 +38,8 @@ pub(super) struct TypeInfo {
     /// Kept alive, so that its address stays its own: a type may be replaced by another of the same name.
     _node_type: Arc<NodeType>,
     pub(super) role: Role,
+    /// The field `children`, if nodes of this type stand above others.
+    pub(super) children: Option<u16>,
     /// Fields whose change moves branches of the tree.
     pub(super) branches: Vec<u16>,
     /// translation, rotation, scale, center, scale_orientation, matrix.
@@ -81,7 +83,7 @@ impl Types {
         });
         let place = self.list.len() as u16;
         self.by_address.insert(Arc::as_ptr(node_type), place);
-        self.list.push(TypeInfo { _node_type: node_type.clone(), role, branches, transform });
+        self.list.push(TypeInfo { _node_type: node_type.clone(), role, children: field("children"), branches, transform });
         place
     }
 

@@ -24,7 +24,7 @@ pub(super) fn read_groups(
         let read = Reader::new(graph, instance.node);
         let light = match read.node("light") {
             Some(light) => {
-                let nowhere = instances.of(light).next().is_none();
+                let nowhere = !instances.of(light).any(|place| instances.at(place).role == Role::Light);
                 let problem = nowhere.then(|| format!("'{}' is no light of this world; no shadow", label(graph, light)));
                 problems.set(graph, instance.node, "light", problem);
                 light_of(light)

@@ -33,7 +33,7 @@ impl Pictures {
         self.memory.retain(|_, image| image.strong_count() > 0);
     }
 
-    fn from_memory(&mut self, image: &umbriel_fields::Image) -> Result<Arc<Image>, String> {
+    fn of_memory(&mut self, image: &umbriel_fields::Image) -> Result<Arc<Image>, String> {
         let (width, height) = (image.width, image.height);
         let expected = 4 * width as usize * height as usize;
         if expected == 0 || image.rgba.len() != expected {
@@ -41,17 +41,16 @@ impl Pictures {
             return Err(format!("a picture of {width} x {height} needs {expected} bytes (more than none), it has {found}"));
         }
         let address = image.rgba.as_ptr() as usize;
-        if let Some(known) = self.memory.get(&address).and_then(Weak::upgrade) {
-            if (known.width, known.height) == (width, height) {
-                return Ok(known);
-            }
+        let known = self.memory.get(&address).and_then(Weak::upgrade);
+        if let Some(known) = known.filter(|k| (k.width, k.height) == (width, height)) {
+            return Ok(known);
         }
         let shared = Arc::new(Image { width, height, rgba: image.rgba.clone() });
         self.memory.insert(address, Arc::downgrade(&shared));
         Ok(shared)
     }
 
-    fn from_file(&mut self, url: &str) -> Result<Arc<Image>, String> {
+    fn of_file(&mut self, url: &str) -> Result<Arc<Image>, String> {
         let path = below(&self.asset_root, url)?;
         if let Some(known) = self.files.get(&path).and_then(Weak::upgrade) {
             return Ok(known);
@@ -98,9 +97,9 @@ pub(super) fn texture(
     let url: Arc<str> = read.get("url");
     let memory: Option<Arc<umbriel_fields::Image>> = read.get("image");
     let (field, image) = match (&memory, &*url) {
-        (Some(image), _) => ("image", pictures.from_memory(image)),
+        (Some(image), _) => ("image", pictures.of_memory(image)),
         (None, "") => ("image", Err("neither image nor url is set; the surface is shown without it".to_owned())),
-        (None, url) => ("url", pictures.from_file(url).map_err(|e| format!("{e}; the surface is shown without it"))),
+        (None, url) => ("url", pictures.of_file(url).map_err(|e| format!("{e}; the surface is shown without it"))),
     };
     for each in ["image", "url"] {
         problems.set(graph, node, each, image.as_ref().err().filter(|_| each == field).cloned());
@@ -158,11 +157,11 @@ mod tests {
         let good = image::RgbaImage::from_pixel(3, 2, image::Rgba([1, 2, 3, 4]));
         good.save(folder.join("good.png")).unwrap();
         let mut pictures = Pictures::new(folder.clone());
-        assert!(pictures.from_file("broken.png").unwrap_err().contains("broken.png"));
-        assert!(pictures.from_file("missing.png").unwrap_err().contains("missing.png"));
-        let image = pictures.from_file("good.png").unwrap();
+        assert!(pictures.of_file("broken.png").unwrap_err().contains("broken.png"));
+        assert!(pictures.of_file("missing.png").unwrap_err().contains("missing.png"));
+        let image = pictures.of_file("good.png").unwrap();
         assert_eq!((image.width, image.height, &image.rgba[..4]), (3, 2, &[1, 2, 3, 4][..]));
-        assert!(Arc::ptr_eq(&image, &pictures.from_file("good.png").unwrap()));
+        assert!(Arc::ptr_eq(&image, &pictures.of_file("good.png").unwrap()));
         std::fs::remove_dir_all(folder).unwrap();
     }
 }

@@ -125,7 +125,7 @@ fn edit(w: &mut World, r: &mut Random, nodes: &mut Vec<NodeId>, count: &mut usiz
         ("Box", _) => ("size", (r.vec3().abs() * length).into()),
         ("Sphere", _) => ("segments", (3 + r.below(5) as i32).into()),
         ("Mesh", 0) => ("index", if sick { vec![0, 1, 9] } else { vec![0, 1, 2] }.into()),
-        ("Mesh", 1) => ("joint", vec![0, r.below(3) as i32, 0, 0].repeat(3).into()),
+        ("Mesh", 1) => ("joint", [0, r.below(3) as i32, 0, 0].repeat(3).into()),
         ("Mesh", 2) => ("weight", vec![glam::vec4(0.5, 0.5, 0.0, 0.0); 3].into()),
         ("Mesh", _) => ("position", vec![r.vec3(), r.vec3(), r.vec3() * length].into()),
         ("Skin", _) => ("joints", [some(r, &of_type(w, nodes, &["Transform"]), 2), some(r, nodes, 2)].concat().into()),
@@ -187,7 +187,7 @@ fn verify_invariants(w: &World) {
 fn following_gives_what_a_fresh_extraction_gives() {
     let mut drawn = 0;
     let mut rebuilt = 0;
-    for seed in 0..12 {
+    for seed in 0..6 {
         let mut r = Random(seed);
         let mut w = World::new();
         w.extractor = Extractor::new().with_place_limit(2_000);
@@ -209,7 +209,7 @@ fn following_gives_what_a_fresh_extraction_gives() {
         }
     }
     assert!(
-        drawn > 10_000 && rebuilt > 500 && rebuilt < 3_000,
+        drawn > 2_000 && rebuilt > 400 && rebuilt < 2_000,
         "{drawn} drawn, {rebuilt} rebuilt: the edits must reach everything"
     );
 }

@@ -88,10 +88,13 @@ fn its_light_is_the_named_one_or_the_first() {
     w.update();
     assert_eq!(light(&w), None);
     assert!(w.problems().is_empty(), "a light may be off");
-    let nowhere = w.node("PointLight", "nowhere");
-    w.set(stencil, "light", nowhere);
-    w.update();
-    assert!(w.problems()[0].contains("'nowhere' is no light of this world"));
+    let wrong = [w.node("PointLight", "nowhere"), w.shape(&[root], "shape")];
+    for (node, name) in wrong.into_iter().zip(["nowhere", "shape"]) {
+        w.set(stencil, "light", node);
+        w.update();
+        assert!(w.problems()[0].contains(&format!("'{name}' is no light of this world")));
+        assert_eq!((light(&w), w.extractor.light_of(node)), (None, None));
+    }
 }
 
 #[test]
