@@ -1,6 +1,8 @@
 //! Tests of the whole: what the command does, and who may depend on whom. One binary, one module per subject.
 
+mod command;
 mod layers;
+mod shadows;
 mod support;
 mod window;
 mod worlds;

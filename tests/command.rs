@@ -1,0 +1,168 @@
+//! The command line: what it prints, and what it says of bad input. One bad thing costs no more than itself.
+
+use crate::support::umbriel;
+use std::path::{Path, PathBuf};
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).expect("a folder can be made");
+    folder
+}
+
+/// Draws a world from a text; gives the run and the picture's path.
+fn draw(name: &str, script: &str, args: &[&str]) -> (crate::support::Run, PathBuf) {
+    let world = folder("command").join(format!("{name}.rhai"));
+    let out = world.with_extension("png");
+    let _ = std::fs::remove_file(&out);
+    std::fs::write(&world, script).expect("a world can be written");
+    let [path, picture] = [&world, &out].map(|p| p.to_str().expect("paths are text"));
+    let run = umbriel(&[&["run", path, "--headless", "--size", "96x64", "--out", picture], args].concat());
+    (run, out)
+}
+
+/// Red everywhere: something that must survive.
+const BACKDROP: &str = r#"
+world.add(transform(#{ translation: vec3(0, 0, -5) }, [shape(make("Box", #{ size: vec3(40, 40, 0.1) }), make("UnlitMaterial", #{ emissive_color: color(1, 0, 0) }))]));
+world.add(make("Viewpoint", #{ position: vec3(0, 0, 5) }));
+"#;
+
+fn corner_is_red(picture: &Path) -> bool {
+    let picture = image::open(picture).expect("the picture was written").to_rgb8();
+    picture.get_pixel(2, 2).0 == [255, 0, 0]
+}
+
+#[test]
+fn a_mistake_costs_itself_and_says_where_it_is() {
+    let truncated = folder("command").join("truncated.glb");
+    std::fs::write(&truncated, b"glTF\x02\0\0\0\xff\0\0\0").expect("a file can be written");
+    // Name, line of the world, what the message must contain. The rest of the world is drawn.
+    let rows: [(&str, &str, &[&str]); 12] = [
+        ("missing_model", r#"world.add(load("nowhere.glb"));"#, &["nowhere.glb", "missing_model.rhai:4"]),
+        ("truncated_model", r#"world.add(load("truncated.glb"));"#, &["truncated.glb", "truncated_model.rhai:4"]),
+        ("endless_handler", r#"on_frame(|t, dt| { loop {} });"#, &["endless_handler.rhai:4", "switched off"]),
+        ("failing_handler", r#"on_frame(|t, dt| { let x = [1][5]; });"#, &["failing_handler.rhai:4", "switched off"]),
+        (
+            "nan_transform",
+            r#"world.add(transform(#{ name: "lost", translation: vec3(0.0/0.0, 0, 0) }, [shape(make("Box"))]));"#,
+            &["lost"],
+        ),
+        ("empty_mesh", r#"let m = make("Mesh"); m.name = "nothing"; world.add(shape(m));"#, &["nothing"]),
+        (
+            "index_out_of_range",
+            r#"let m = make("Mesh", #{ position: [vec3(0,0,0), vec3(1,0,0), vec3(0,1,0)], index: [0, 1, 7] }); m.name = "torn"; world.add(shape(m));"#,
+            &["torn", "7"],
+        ),
+        (
+            "map_of_size_0",
+            r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "map", shadow_size: 0 }));"#,
+            &["sun", "shadow_size"],
+        ),
+        (
+            "near_behind_far",
+            r#"world.add(make("SpotLight", #{ name: "spot", shadows: "map", shadow_near_far: vec2(5.0, 1.0) }));"#,
+            &["spot", "shadow_near_far"],
+        ),
+        (
+            "missing_texture",
+            r#"world.add(shape(make("Box"), make("PhysicalMaterial", #{ base_texture: make("ImageTexture", #{ url: "no.png" }) })));"#,
+            &["no.png"],
+        ),
+        (
+            "lightless_stencil",
+            r#"world.add(make("StencilShadow", #{ name: "group", caster: [shape(make("Box"))] }));"#,
+            &["group", "light"],
+        ),
+        (
+            "flat_screen",
+            r#"make("Display", #{ name: "wall", screens: [make("Screen", #{ name: "flat", lower_left: vec3(0,0,0), lower_right: vec3(0,0,0), upper_left: vec3(0,1,0) })], user: make("User") });"#,
+            &["wall"],
+        ),
+    ];
+    for (name, line, expected) in rows {
+        let (run, picture) = draw(name, &format!("{BACKDROP}{line}\n"), &[]);
+        assert!(!run.ok, "{name}: a problem must be seen in the exit status\n{}{}", run.stdout, run.stderr);
+        for part in expected {
+            assert!(run.stderr.contains(part), "{name}: '{part}' is not in\n{}", run.stderr);
+        }
+        assert!(corner_is_red(&picture), "{name}: the rest of the world is gone");
+        println!("{name}: {}", run.stderr.trim());
+    }
+}
+
+#[test]
+fn a_wrong_world_ends_with_a_message() {
+    let rows: [(&str, &str, &[&str]); 7] = [
+        ("unknown_node", "let a = 1;\nlet b = make(\"SpotLihgt\");", &["unknown_node.rhai:2", "SpotLihgt", "SpotLight"]),
+        (
+            "unknown_field",
+            "let b = make(\"SpotLight\");\n\nb.shadwos = \"map\";",
+            &["unknown_field.rhai:3", "shadwos", "shadows", "SpotLight"],
+        ),
+        (
+            "wrong_type",
+            "let b = make(\"SpotLight\");\nb.intensity = \"bright\";",
+            &["wrong_type.rhai:2", "intensity", "SpotLight"],
+        ),
+        ("wrong_choice", "let b = make(\"SpotLight\");\nb.shadows = \"volumes\";", &["wrong_choice.rhai:2", "volumes", "volume"]),
+        ("syntax", "let a = ;", &["syntax.rhai:1"]),
+        ("endless", "loop {}", &["endless.rhai:1"]),
+        (
+            "strong_loop",
+            "let a = make(\"Sum\"); let b = make(\"Sum\");\nroute(a, \"output\", b, \"a\");\nroute(b, \"output\", a, \"a\");",
+            &["strong_loop.rhai:3", "weak"],
+        ),
+    ];
+    for (name, script, expected) in rows {
+        let (run, _) = draw(name, script, &[]);
+        assert!(!run.ok, "{name}");
+        for part in expected {
+            assert!(run.stderr.contains(part), "{name}: '{part}' is not in\n{}", run.stderr);
+        }
+        println!("{name}: {}", run.stderr.trim());
+    }
+}
+
+#[test]
+fn wrong_words_on_the_command_line() {
+    let rows: [(&[&str], &str); 8] = [
+        (&["run", "nowhere.rhai", "--headless"], "nowhere.rhai"),
+        (&["run", "nowhere.glb", "--headless"], "nowhere.glb"),
+        (&["run", "a.txt", "--headless"], ".rhai"),
+        (&["run", "a.rhai", "--headless", "--size", "0x10"], "0x10"),
+        (&["run", "a.rhai", "--headless", "--frames", "0"], "--frames"),
+        (&["run", "a.rhai", "--headless", "--time", "NaN"], "--time"),
+        (&["shadow-error", "--scene", "nowhere.json"], "nowhere.json"),
+        (&["nodes", "Transfrom"], "Transform"),
+    ];
+    for (args, expected) in rows {
+        let run = umbriel(args);
+        assert!(!run.ok && run.stderr.contains(expected), "{args:?}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn an_unknown_view_names_the_views_that_there_are() {
+    let (run, _) = draw("views", "world.add(make(\"Viewpoint\", #{ name: \"tower\" }));", &["--view", "towre"]);
+    assert!(!run.ok && run.stderr.contains("tower"), "{}", run.stderr);
+}
+
+#[test]
+fn frames_are_numbered_and_follow_the_clock() {
+    let script = format!(
+        "{BACKDROP}\nlet c = make(\"TimeSensor\", #{{ cycle_interval: 2.0, loop: true }});\n\
+         let p = make(\"PositionInterpolator\", #{{ key: [0.0, 1.0], key_value: [vec3(-4, 0, 0), vec3(4, 0, 0)] }});\n\
+         let t = transform(#{{}}, [shape(make(\"Box\"), make(\"UnlitMaterial\", #{{ emissive_color: color(1, 1, 1) }}))]);\n\
+         world.add(t);\nroute(c, \"fraction_changed\", p, \"set_fraction\");\nroute(p, \"value_changed\", t, \"translation\");\n"
+    );
+    let (run, out) = draw("frames", &script, &["--frames", "3", "--fps", "2", "--time", "0.5"]);
+    assert!(run.ok, "{}", run.stderr);
+    let place = |frame: u32| {
+        let path = out.with_file_name(format!("frames.{frame:04}.png"));
+        let picture = image::open(path).expect("the frame was written").to_rgb8();
+        let white: Vec<f32> = picture.enumerate_pixels().filter(|(_, _, p)| p.0[1] > 128).map(|(x, ..)| x as f32).collect();
+        white.iter().sum::<f32>() / white.len() as f32
+    };
+    let places = [0, 1, 2].map(place);
+    let steps = [places[1] - places[0], places[2] - places[1]];
+    assert!(steps.iter().all(|s| *s > 5.0) && (steps[0] - steps[1]).abs() < 2.0, "{places:?}");
+}
