@@ -197,7 +197,7 @@ impl Renderer {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         stats.deformed = self.deformer.run(&mut encoder);
-        self.volumes.prepare(device, queue, &mut encoder, jobs);
+        self.volumes.prepare(device, &mut encoder, jobs);
         let drawer = Drawer {
             meshes: &self.meshes,
             materials: &self.materials,
