@@ -1,12 +1,14 @@
 //! Every sample model against its own JSON, read here a second time.
 
 use crate::tiny::{get, load_new, node, of_type};
-use glam::Vec3;
+use glam::{Mat4, Quat, Vec3};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use umbriel_fields::{Graph, NodeId};
+use umbriel_scene::{Aabb, Scene};
+use umbriel_scenegraph::Extractor;
 
 /// Where the samples are; `None` (a failure where they are required) if they are not there.
 pub(crate) fn samples() -> Option<PathBuf> {
@@ -146,5 +148,63 @@ fn missing_pictures_are_named() {
     let warning = &model.unwrap().warnings[0];
     for part in ["pavement.glb", "Textures/colormap.png", "texture 0", "does not exist"] {
         assert!(warning.contains(part), "{warning}");
+    }
+}
+
+/// World bounds of the default scene by the JSON alone: the corners of each primitive's box under the nodes' matrices.
+fn expected_bounds(json: &Value, node: usize, world_from_parent: Mat4, out: &mut Vec<Vec3>) {
+    let node = &list(json, "nodes")[node];
+    let number = |key: &str, i: usize, spare: f32| node.get(key).map_or(spare, |v| v[i].as_f64().unwrap() as f32);
+    let matrix = match node.get("matrix") {
+        Some(_) => Mat4::from_cols_array(&std::array::from_fn(|i| number("matrix", i, 0.0))),
+        None => Mat4::from_scale_rotation_translation(
+            Vec3::from_array(std::array::from_fn(|i| number("scale", i, 1.0))),
+            Quat::from_array(std::array::from_fn(|i| number("rotation", i, if i == 3 { 1.0 } else { 0.0 }))),
+            Vec3::from_array(std::array::from_fn(|i| number("translation", i, 0.0))),
+        ),
+    };
+    let world_from_node = world_from_parent * matrix;
+    for primitive in index(node, "mesh").map_or(&[][..], |m| list(&list(json, "meshes")[m], "primitives")) {
+        let accessor = &list(json, "accessors")[index(&primitive["attributes"], "POSITION").unwrap()];
+        let at = |key: &str, i: usize| accessor[key][i].as_f64().unwrap() as f32;
+        for corner in 0..8 {
+            let side = |i: usize| if corner >> i & 1 == 0 { at("min", i) } else { at("max", i) };
+            out.push(world_from_node.transform_point3(Vec3::new(side(0), side(1), side(2))));
+        }
+    }
+    for child in list(node, "children") {
+        expected_bounds(json, child.as_u64().unwrap() as usize, world_from_node, out);
+    }
+}
+
+#[test]
+fn every_sample_becomes_a_scene() {
+    let Some(folder) = samples() else { return };
+    let mut files = Vec::new();
+    for sub in ["gltf", "meshes", "ships", "controllers", "worlds"] {
+        files_below(&folder.join(sub), &mut files);
+    }
+    for file in files {
+        let (mut graph, model) = load_new(&file);
+        let (model, json) = (model.unwrap(), json_of(&file));
+        let world = graph.find("world").unwrap();
+        graph.set_named(world, "children", Arc::<[Option<NodeId>]>::from([Some(model.root)])).unwrap();
+        let (mut extractor, mut scene) = (Extractor::new(), Scene::default());
+        extractor.update(&graph, &mut scene);
+        let problems = extractor.problems();
+        assert!(problems.is_empty(), "{}: {problems:?}", file.display());
+        let shown: Vec<_> = scene.drawables.iter().filter(|d| d.visible).collect();
+        let mut corners = Vec::new();
+        for root in list(&list(&json, "scenes")[index(&json, "scene").unwrap_or(0)], "nodes") {
+            expected_bounds(&json, root.as_u64().unwrap() as usize, Mat4::IDENTITY, &mut corners);
+        }
+        assert_eq!((shown.len(), scene.lights.len()), (corners.len() / 8, model.lights.len()), "{}", file.display());
+        // Of skins only the joints place the vertices.
+        if list(&json, "skins").is_empty() {
+            let expected = Aabb::from_points(corners);
+            let found = shown.iter().fold(Aabb::EMPTY, |b, d| b.union(d.bounds_in_world));
+            let off = (found.min - expected.min).abs().max((found.max - expected.max).abs()).max_element();
+            assert!(off <= 1e-4 * expected.radius(), "{}: {found:?} instead of {expected:?}", file.display());
+        }
     }
 }
