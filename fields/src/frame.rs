@@ -8,7 +8,7 @@ use crate::graph::slot_of;
 use crate::program::{Group, copy_group};
 use crate::route::Arrival;
 use crate::schedule::{EVALUATES, IN_TURN, OBSERVED, ROUTED, SILENCED};
-use crate::{Error, Evaluator, FieldId, Graph, Mode, NodeId, Route, RouteId, SetRule, Strength, Value};
+use crate::{Error, Evaluator, Field, FieldId, Graph, Mode, NodeId, Route, RouteId, SetRule, Strength, Value};
 
 /// What the graph asks for while a frame is evaluated. Everything is allowed in these calls but to evaluate the graph: what is created,
 /// connected or written for nodes that had their turn takes part from the next frame on.
@@ -100,9 +100,7 @@ impl Graph {
     }
 
     fn run_frame(&mut self, host: &mut dyn Host) {
-        for carried in std::mem::take(&mut self.frame.carried) {
-            self.deliver(carried.route, &carried.value, carried.written);
-        }
+        self.deliver_carried();
         for slot in &self.frame.always {
             self.schedule.mark(*slot);
         }
@@ -219,8 +217,9 @@ impl Graph {
         if (flags & !(ROUTED | SILENCED) != 0 || asked) && !self.live_turn(slot, asked, host) {
             return;
         }
+        let before = std::mem::replace(&mut self.schedule.turns[slot as usize].propagated, self.changes.last());
         if self.schedule.flags[slot as usize] & ROUTED != 0 {
-            self.copy_out(slot);
+            self.copy_out(slot, before);
         }
     }
 
@@ -291,10 +290,9 @@ impl Graph {
         true
     }
 
-    /// Copies along the node's routes what was written since it last did.
-    fn copy_out(&mut self, slot: u32) {
+    /// Copies along the node's routes what was written after a revision.
+    fn copy_out(&mut self, slot: u32, before: Revision) {
         let program = self.programs.take(slot).unwrap_or_else(|| self.compile(self.ids[slot as usize]));
-        let before = std::mem::replace(&mut self.schedule.turns[slot as usize].propagated, self.changes.last());
         let silenced = self.schedule.flags[slot as usize] & SILENCED != 0;
         for group in &program {
             let written = self.columns.revisions(group.field_type)[group.source as usize];
@@ -309,29 +307,55 @@ impl Graph {
         self.silenced.get(&FieldId { node: self.ids[slot as usize], index }) == Some(&written)
     }
 
+    /// One write of a source is one write of all its targets: they share a revision.
     #[inline]
     fn run_group(&mut self, group: &Group, written: Revision) {
+        let revision = self.changes.last() + 1;
+        let mut copied = 0;
         if !group.direct.is_empty() {
             let (columns, changes, schedule) = (&mut self.columns, &mut self.changes, &mut self.schedule);
-            self.frame.report.copied += copy_group(columns, changes, schedule, group, written);
+            copied = copy_group(columns, changes, schedule, group, written, revision);
         }
-        if group.slow.is_empty() && group.weak.is_empty() {
-            return;
+        if !group.slow.is_empty() {
+            let value = self.columns.value(group.field_type, group.source);
+            copied += group.slow.iter().filter(|route| self.deliver(**route, &value, written, revision)).count();
         }
-        let value = self.columns.value(group.field_type, group.source);
-        for route in &group.slow {
-            self.deliver(*route, &value, written);
-        }
-        for route in &group.weak {
-            self.frame.carried.push(Carried { route: *route, value: value.clone(), written });
+        self.copied(copied);
+        if !group.weak.is_empty() {
+            self.depart(group);
         }
     }
 
+    /// Values leave along weak routes. That they leave is the write that counts when they arrive: the source's own is a frame old by then.
+    fn depart(&mut self, group: &Group) {
+        let value = self.columns.value(group.field_type, group.source);
+        let written = self.changes.next();
+        let carried = group.weak.iter().map(|route| Carried { route: *route, value: value.clone(), written });
+        self.frame.carried.extend(carried);
+    }
+
+    /// Takes the revision that so many copies used, if any did.
+    fn copied(&mut self, copied: usize) {
+        if copied > 0 {
+            self.changes.next();
+            self.frame.report.copied += copied;
+        }
+    }
+
+    /// Delivers what weak routes carry since the last frame, as one write.
+    fn deliver_carried(&mut self) {
+        let revision = self.changes.last() + 1;
+        let carried = std::mem::take(&mut self.frame.carried);
+        let copied =
+            carried.iter().filter(|carried| self.deliver(carried.route, &carried.value, carried.written, revision)).count();
+        self.copied(copied);
+    }
+
     /// Delivers a value along a route, unless the target was written later than the source, or a route with a later write was here before.
-    fn deliver(&mut self, route: RouteId, value: &Value, written: Revision) {
-        let Some(route) = self.routes.all.get(route).copied() else { return };
-        let Ok((target, slot)) = self.place(route.to) else { return };
-        let (field_type, range, compare) = (target.field_type, target.range, target.on_set == SetRule::Compare);
+    fn deliver(&mut self, route: RouteId, value: &Value, written: Revision, revision: Revision) -> bool {
+        let Some(route) = self.routes.all.get(route).copied() else { return false };
+        let Ok((target, slot)) = self.place(route.to) else { return false };
+        let (field_type, compare) = (target.field_type, target.on_set == SetRule::Compare);
         let fan_in = self.is_fan_in(route.to);
         let last = self.columns.revisions(field_type)[slot as usize];
         let arrival = self.routes.arrivals.get(&route.to).copied().filter(|arrival| fan_in && arrival.delivered == last);
@@ -339,23 +363,17 @@ impl Graph {
             Some(arrival) => (written, route.ordinal) <= arrival.won,
             None => written <= last,
         };
-        if late {
-            return;
-        }
-        let Some(value) = value.convert(field_type) else { return };
-        let value = range.map_or(value.clone(), |(smallest, largest)| value.clamped(smallest, largest));
-        let revision = self.changes.last() + 1;
+        let Some(value) = (if late { None } else { carried_as(value, target) }) else { return false };
         let copied = self.columns.write(slot, value, compare, revision);
         if copied {
-            self.changes.next();
             self.changes.wrote(slot_of(route.to.node), revision);
             self.schedule.mark(slot_of(route.to.node));
-            self.frame.report.copied += 1;
         }
         if fan_in {
             let delivered = if copied { revision } else { last };
             self.routes.arrivals.insert(route.to, Arrival { won: (written, route.ordinal), delivered });
         }
+        copied
     }
 
     /// What a new route does: the target takes the source's value, if that was ever written.
@@ -368,9 +386,7 @@ impl Graph {
         }
         let value = self.columns.value(source.field_type, slot);
         let Ok((target, slot)) = self.place(to) else { return };
-        let range = target.range;
-        let Some(value) = value.convert(target.field_type) else { return };
-        let value = range.map_or(value.clone(), |(smallest, largest)| value.clamped(smallest, largest));
+        let Some(value) = carried_as(&value, target) else { return };
         let revision = self.changes.last() + 1;
         if self.columns.write(slot, value, true, revision) {
             self.changes.next();
@@ -378,4 +394,13 @@ impl Graph {
             self.schedule.mark(slot_of(to.node));
         }
     }
+}
+
+/// What a value becomes on its way into a field: converted, and moved into the field's range.
+fn carried_as(value: &Value, target: &Field) -> Option<Value> {
+    let value = value.convert(target.field_type)?;
+    Some(match target.range {
+        Some((smallest, largest)) => value.clamped(smallest, largest),
+        None => value,
+    })
 }

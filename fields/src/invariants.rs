@@ -73,7 +73,7 @@ impl Graph {
         }
         for id in self.nodes.keys() {
             if let Some(program) = self.programs.get(slot_of(id))
-                && format!("{program:?}") != format!("{:?}", self.compile(id))
+                && *program != self.compile(id)
             {
                 return Err(format!("the copy list of {} is out of date", self.describe(id)));
             }

@@ -104,7 +104,7 @@ impl Graph {
         if !self.schedule.stale {
             return;
         }
-        while let Err(unordered) = self.order() {
+        while let Err(unordered) = self.renumber() {
             // Strong routes have no loops, so only what was asked for this frame can stand in the way.
             tracing::error!("{unordered} nodes cannot be ordered");
             if self.frame.dependencies.pop().is_none() {
@@ -115,7 +115,7 @@ impl Graph {
     }
 
     /// Kahn's algorithm over the strong routes and this frame's dependencies; the error is how many nodes are in loops.
-    fn order(&mut self) -> Result<(), usize> {
+    fn renumber(&mut self) -> Result<(), usize> {
         let slots: Vec<u32> = self.schedule.by_rank.iter().copied().filter(|slot| *slot != NO_RANK).collect();
         let mut waits_for = vec![0u32; self.ids.len()];
         let mut after: HashMap<u32, Vec<u32>> = HashMap::new();
@@ -150,6 +150,11 @@ impl Graph {
         Ok(())
     }
 
+    /// The nodes that take part in evaluation, in the order in which they have their turns; of the last frame, if routes were made since.
+    pub fn evaluation_order(&self) -> impl Iterator<Item = NodeId> {
+        self.schedule.by_rank.iter().filter(|slot| **slot != NO_RANK).map(|slot| self.ids[*slot as usize])
+    }
+
     /// In this frame, or in the next if none is being evaluated, `node` has its turn after `on`; if `on` is evaluated only when asked for, this
     /// asks. Without effect for a node that had its turn in this frame.
     pub fn depend_for_this_frame(&mut self, node: NodeId, on: NodeId) -> Result<(), Error> {
@@ -158,7 +163,7 @@ impl Graph {
         let (later, earlier) = (slot_of(node), slot_of(on));
         let (before, after) = (self.schedule.ranked(earlier), self.schedule.ranked(later));
         self.frame.dependencies.push((node, on));
-        if (self.schedule.stale || before >= after) && self.order().is_err() {
+        if (self.schedule.stale || before >= after) && self.renumber().is_err() {
             self.frame.dependencies.pop();
             return Err(Error::Dependency { node: self.describe(node), on: self.describe(on) });
         }

@@ -8,7 +8,7 @@ use crate::schedule::Schedule;
 use crate::{FieldType, FieldValue, Graph, Kind, NodeId, RouteId, SetRule, Strength};
 
 /// A copy into a field of the source's type, to which no other route goes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Copy {
     /// The target's place in the column.
     pub(crate) slot: u32,
@@ -18,7 +18,7 @@ pub(crate) struct Copy {
 }
 
 /// What happens when one field was written.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub(crate) struct Group {
     pub(crate) index: u16,
     pub(crate) field_type: FieldType,
@@ -102,10 +102,10 @@ fn copy_direct<T: FieldValue>(
     schedule: &mut Schedule,
     group: &Group,
     written: Revision,
+    revision: Revision,
 ) -> usize {
     let column = T::column_mut(columns);
     let value = column.values[group.source as usize].clone();
-    let revision = changes.last() + 1;
     let mut copied = 0;
     for copy in &group.direct {
         let slot = copy.slot as usize;
@@ -117,9 +117,6 @@ fn copy_direct<T: FieldValue>(
         changes.wrote(copy.node, revision);
         schedule.mark(copy.node);
         copied += 1;
-    }
-    if copied > 0 {
-        changes.next();
     }
     copied
 }
@@ -134,10 +131,11 @@ macro_rules! copy_group {
             schedule: &mut Schedule,
             group: &Group,
             written: Revision,
+            revision: Revision,
         ) -> usize {
             match (group.field_type.kind, group.field_type.multiple) { $(
-                (Kind::$one, false) => copy_direct::<$type>(columns, changes, schedule, group, written),
-                (Kind::$one, true) => copy_direct::<std::sync::Arc<[$type]>>(columns, changes, schedule, group, written),
+                (Kind::$one, false) => copy_direct::<$type>(columns, changes, schedule, group, written, revision),
+                (Kind::$one, true) => copy_direct::<std::sync::Arc<[$type]>>(columns, changes, schedule, group, written, revision),
             )* }
         }
     };

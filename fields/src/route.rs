@@ -113,6 +113,10 @@ impl Graph {
         self.routes.made += 1;
         let (from_place, to_place) = (self.nodes[from.node].outgoing.len() as u32, self.nodes[to.node].incoming.len() as u32);
         let route = self.routes.all.insert(Route { from, to, strength, ordinal: self.routes.made, from_place, to_place });
+        if from_place == 0 {
+            // What was written while nobody listened is no news later.
+            self.schedule.turns[slot_of(from.node) as usize].propagated = self.changes.last();
+        }
         self.nodes[from.node].outgoing.push(route);
         self.nodes[to.node].incoming.push(route);
         self.schedule.flags[slot_of(from.node) as usize] |= ROUTED;
