@@ -217,3 +217,37 @@ fn the_world_moves_lights_and_viewpoints_included() {
     assert!(w.problems()[0].contains("makes no pose"));
     assert!(close(w.drawable("box").world_from_object, Mat4::IDENTITY));
 }
+
+#[test]
+fn a_type_of_somebody_else_with_children_is_a_group() {
+    let mut w = World::new();
+    let door = umbriel_fields::NodeType::new("Door", "A script's own type.").field(umbriel_fields::Field::nodes("children"));
+    w.graph.types().register(door).unwrap();
+    let door = w.below(&[w.root()], "Door", "door");
+    w.shape(&[door], "leaf");
+    w.update();
+    assert_eq!(w.names(), ["leaf"]);
+    w.set(door, "children", Vec::<umbriel_fields::NodeId>::new());
+    w.update();
+    assert!(w.names().is_empty());
+}
+
+#[test]
+fn without_a_world_nothing_is_shown_until_there_is_one() {
+    let mut w = World::new();
+    let root = w.root();
+    let shape = w.shape(&[root], "box");
+    w.below(&[root], "PointLight", "");
+    w.below(&[root], "Viewpoint", "");
+    let stencil = w.below(&[root], "StencilShadow", "");
+    w.update();
+    assert_eq!((w.scene.lights.len(), w.scene.stencil_groups.len(), w.extractor.viewpoints().len()), (1, 1, 1));
+    w.graph.delete(root).unwrap();
+    w.update();
+    assert!(w.scene.drawables.iter().all(|d| !d.visible));
+    assert_eq!((w.scene.lights.len(), w.scene.stencil_groups.len(), w.extractor.viewpoints().len()), (0, 0, 0));
+    let again = w.node("Transform", "world");
+    w.set(again, "children", [stencil, shape]);
+    w.update();
+    assert_eq!(w.names(), ["box"], "any node of that name is the world");
+}
