@@ -50,7 +50,7 @@ pub enum Button {
     Right,
 }
 
-/// What was done with mouse or keys. `view` is the view under the mouse.
+/// What was done with mouse or keys.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input<'a> {
     /// The mouse moved by `pixels` (x to the right, y down) with a button held.
@@ -77,7 +77,7 @@ pub enum Input<'a> {
         haste: f32,
         /// Since when, seconds.
         dt_s: f32,
-        /// Over what.
+        /// What leads ahead.
         view: &'a View,
     },
 }

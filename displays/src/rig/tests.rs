@@ -199,8 +199,16 @@ fn a_display_without_anybody_is_told() {
     // Whoever comes is taken.
     let mut rig = Rig::new();
     assert_eq!(shown(&graph, &mut rig, None, &[]).unwrap().pictures[0].name, DESKTOP);
-    graph.create("User").unwrap();
+    let guest = graph.create("User").unwrap();
     assert_eq!(shown(&graph, &mut rig, None, &[]).unwrap().pictures[0].name, "wall");
+    // When the first one leaves, the next one looks.
+    let next = graph.create("User").unwrap();
+    set(&mut graph, next, "position", Vec3::new(0.5, 1.5, 0.0));
+    shown(&graph, &mut rig, None, &[]).unwrap();
+    graph.delete(guest).unwrap();
+    let result = shown(&graph, &mut rig, None, &[]).unwrap();
+    let room_from_view = result.pictures[0].views[0].view_from_world.inverse();
+    assert!(room_from_view.w_axis.truncate().abs_diff_eq(Vec3::new(0.5, 1.5, 0.0), 1e-6));
 }
 
 #[test]

@@ -106,10 +106,16 @@ pub(super) fn view_at(picture: &Picture, cursor: Vec2, window: [u32; 2]) -> Opti
     picture.views.get(tiles.iter().position(inside).unwrap_or(0))
 }
 
+/// The view that leads ahead, wherever the mouse is: of several walls the one that an unturned head looks at, along -z.
+pub(super) fn view_ahead(picture: &Picture) -> Option<&View> {
+    let backwards = |view: &View| view.view_from_world.inverse().z_axis.z;
+    picture.views.iter().max_by(|a, b| backwards(a).total_cmp(&backwards(b)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::Arrangement;
+    use crate::rig::{Arrangement, ScreenCorners, cylinder_screens, off_axis, room_screens};
     use ElementState::{Pressed, Released};
     use glam::Mat4;
     use umbriel_scene::Frustum;
@@ -163,6 +169,20 @@ mod tests {
         // The window is half as large as the picture.
         for (x, y, want) in [(10.0, 10.0, "a"), (60.0, 49.0, "b"), (149.0, 0.0, "c"), (900.0, -7.0, "a")] {
             assert_eq!(view_at(&row, Vec2::new(x, y), [150, 50]).unwrap().name, want, "{x} {y}");
+        }
+    }
+    #[test]
+    fn of_many_walls_the_front_one_leads_ahead() {
+        let room = room_screens(3.0, 3.0, 3.0);
+        let ring = cylinder_screens(7, 4.7, 2.0, 2.0, Vec3::Y);
+        for (walls, front) in [(vec![room.left, room.floor, room.front, room.right], 2), (ring, 3), (vec![room.right], 0)] {
+            let view = |(i, wall): (usize, &ScreenCorners)| {
+                let (view_from_world, frustum) = off_axis(Vec3::new(0.1, 1.2, 0.2), wall, 0.1).unwrap();
+                View { name: i.to_string(), view_from_world, frustum, size: [10, 10] }
+            };
+            let views = walls.iter().enumerate().map(view).collect();
+            let picture = Arrangement::Row.picture("walls".into(), views, 1).unwrap();
+            assert_eq!(view_ahead(&picture).unwrap().name, front.to_string());
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The loop of the windows: events in, frames out.
 
-use super::controls::{Action, notches, view_at};
+use super::controls::{Action, notches, view_ahead, view_at};
 use super::frame_rate::FrameRate;
 use super::pane::Pane;
 use super::{App, Options, WindowSizes};
@@ -173,9 +173,11 @@ impl<A: App> Windows<'_, A> {
     fn go(&mut self, now: Instant) {
         // After a stall, nobody wants to find himself on the other side of a wall.
         let dt_s = (now - self.last_frame).as_secs_f32().min(0.1);
-        for place in 0..self.panes.len() {
-            if let Some((direction, haste)) = self.panes[place].controls.held() {
-                self.navigate(place, |view, _| navigation::Input::Keys { direction, haste, dt_s, view });
+        for pane in &self.panes {
+            let Some((direction, haste)) = pane.controls.held() else { continue };
+            let picture = self.pictures.iter().find(|p| p.name == pane.name);
+            if let Some(view) = picture.and_then(view_ahead) {
+                self.app.navigate(navigation::Input::Keys { direction, haste, dt_s, view });
             }
         }
     }

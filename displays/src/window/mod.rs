@@ -22,7 +22,7 @@ pub struct Options {
     pub frames: Option<u64>,
 }
 
-/// Pixels across and down of each window that is open, by the name of its picture.
+/// Pixels across and down of each window that can be seen, by the name of its picture.
 pub type WindowSizes = BTreeMap<String, [u32; 2]>;
 
 /// What is drawn now.
