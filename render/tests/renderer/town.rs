@@ -118,12 +118,12 @@ fn maps_agree_with_ray_tracing() {
     scene.background = Background { zenith: Vec3::new(0.1, 0.2, 0.6), horizon: Vec3::splat(0.6), nadir: Vec3::splat(0.1) };
     let mut failed = Vec::new();
     for (light, camera, least) in [
-        ("sun", "overview", 0.88),
-        ("sun", "eye_level", 0.88),
-        ("spot", "overview", 0.88),
-        ("spot", "eye_level", 0.88),
-        ("lamp", "overview", 0.88),
-        ("lamp", "eye_level", 0.88),
+        ("sun", "overview", 0.98),
+        ("sun", "eye_level", 0.98),
+        ("spot", "overview", 0.98),
+        ("spot", "eye_level", 0.98),
+        ("lamp", "overview", 0.98),
+        ("lamp", "eye_level", 0.98),
     ] {
         let name = format!("town_square__{light}__{camera}");
         let json = std::fs::read_to_string(samples.join(format!("worlds/scenes/{name}.json"))).unwrap();

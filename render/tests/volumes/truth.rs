@@ -31,12 +31,11 @@ impl Truth {
     }
 
     /// Is what is seen at this place of the picture (pixels from the top left) in shadow? `None` where nothing is seen,
-    /// where the four nearest sub-samples disagree, and where light grazes the surface.
+    /// where the four nearest sub-samples do not all agree with it, and where light grazes the surface.
     pub(crate) fn shadowed(&self, x: f64, y: f64) -> Option<bool> {
+        let here = self.one(x, y)?;
         let around = [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)];
-        let mut all = around.into_iter().map(|(dx, dy)| self.one(x + dx, y + dy));
-        let first = all.next()??;
-        all.all(|s| s == Some(first)).then_some(first)
+        around.into_iter().all(|(dx, dy)| self.one(x + dx, y + dy) == Some(here)).then_some(here)
     }
 
     fn one(&self, x: f64, y: f64) -> Option<bool> {

@@ -1,0 +1,132 @@
+//! Shadows against closed forms: a ball over a floor.
+
+use crate::support::*;
+use glam::{Mat4, Vec3};
+use umbriel_scene::*;
+
+const CENTRE: Vec3 = Vec3::new(0.0, 2.0, 0.0);
+const RADIUS: f32 = 0.7;
+
+fn ball_over_floor(light: Light) -> Scene {
+    let floor = shape(plane(12.0), matt(0.5, 0.5, 0.5), Mat4::IDENTITY);
+    let ball = shape(ball(96), matt(0.8, 0.3, 0.2), Mat4::from_translation(CENTRE) * Mat4::from_scale(Vec3::splat(RADIUS)));
+    Scene { drawables: vec![floor, ball], lights: vec![light], ..Default::default() }
+}
+
+/// How far a point of the floor is inside of the ball's shadow, metres; negative outside.
+fn depth_in_shadow(light: &Light, p: Vec3) -> f32 {
+    let towards = if light.kind == LightKind::Directional { -light.direction } else { (light.position - p).normalize() };
+    let along = (CENTRE - p).dot(towards);
+    if along < 0.0 {
+        return -1.0;
+    }
+    RADIUS - (p + towards * along - CENTRE).length()
+}
+
+/// Light, and the share of pixels on the floor that are right, leaving out those within a texel of the outline.
+fn agreement(name: &str, light: Light, margin: f32) -> (f32, u32) {
+    let scene = ball_over_floor(light.clone());
+    let size = [200, 200];
+    // From below the ball, so that it hides nothing.
+    let eye = Vec3::new(0.0, 1.2, 0.0);
+    let mut view = look(name, eye, Vec3::ZERO, size);
+    view.frustum = Frustum::symmetric(2.2, 1.0, 0.1);
+    let picture = Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view.clone()) };
+    let shot = shoot(&scene, &picture);
+    assert_eq!(shot.problems, Vec::<String>::new());
+    let world_from_clip = (view.frustum.clip_from_view() * view.view_from_world).inverse();
+    let (mut right, mut counted, mut dark) = (0, 0, 0);
+    for i in 0..size[0] * size[1] {
+        let (x, y) = (i % size[0], i / size[0]);
+        let ndc = [(x as f32 + 0.5) / 100.0 - 1.0, 1.0 - (y as f32 + 0.5) / 100.0];
+        let ray = (world_from_clip * glam::Vec4::new(ndc[0], ndc[1], 0.0, 1.0)).truncate();
+        let p = eye - ray * (eye.y / ray.y);
+        let depth = depth_in_shadow(&light, p);
+        if ray.y >= 0.0 || p.x.abs().max(p.z.abs()) > 5.9 || depth.abs() < margin {
+            continue;
+        }
+        counted += 1;
+        dark += u32::from(depth > 0.0);
+        right += u32::from((shot.pixel(x, y)[0] < 128) == (depth > 0.0));
+    }
+    (right as f32 / counted as f32, dark)
+}
+
+#[test]
+fn a_ball_throws_the_shadow_that_geometry_says() {
+    let slanted = Vec3::new(0.3, -1.0, -0.2).normalize();
+    let position = Vec3::new(0.8, 5.0, -0.6);
+    let lamp = |kind| Light { kind, position, direction: (CENTRE - position).normalize(), ..noon() };
+    let cone = |outer_rad| LightKind::Spot { inner_rad: 0.1, outer_rad };
+    let lights = [
+        ("directional", Light { direction: slanted, ..noon() }),
+        ("straight down", noon()),
+        ("spot", lamp(cone(0.6))),
+        ("wide spot", lamp(cone(1.4))),
+        ("point", lamp(LightKind::Point)),
+    ];
+    for (name, light) in lights {
+        for filter in [MapFilter::None, MapFilter::Hardware, MapFilter::Pcf4, MapFilter::Pcf16] {
+            let map = MapSettings { size: 1024, filter, ..Default::default() };
+            let light = Light { shadows: ShadowMethod::Map, map, ..light.clone() };
+            let (share, dark) = agreement("ball_map", light, 0.02);
+            assert!(share > 0.9995 && dark > 1000, "{name} {filter:?}: {share} of the floor is right, {dark} in shadow");
+        }
+    }
+}
+
+#[test]
+fn settings_by_hand_are_obeyed() {
+    let light = |map: MapSettings| {
+        let position = Vec3::new(0.0, 6.0, 0.0);
+        let spot = LightKind::Spot { inner_rad: 0.1, outer_rad: 0.8 };
+        let base = Light { kind: spot, position, direction: Vec3::NEG_Y, shadows: ShadowMethod::Map, map, ..noon() };
+        shoot(
+            &ball_over_floor(base),
+            &Picture {
+                kind: PictureKind::LightVisibility(0),
+                ..Picture::mono(View {
+                    frustum: Frustum::symmetric(1.2, 1.0, 0.1),
+                    ..look("by_hand", Vec3::new(0.0, 1.2, 0.0), Vec3::ZERO, [64, 64])
+                })
+            },
+        )
+        .centre()[0]
+    };
+    let map = MapSettings { size: 512, ..Default::default() };
+    for (name, map, expected) in [
+        ("fitted", map, 0),
+        ("bias of a millimetre", MapSettings { constant_bias: Some(0.001), ..map }, 0),
+        ("bias of three metres", MapSettings { constant_bias: Some(3.0), ..map }, 255),
+        ("near behind the ball", MapSettings { near_far: Some([5.0, 20.0]), ..map }, 255),
+        ("far before the floor", MapSettings { near_far: Some([1.0, 5.0]), ..map }, 255),
+        ("near and far around", MapSettings { near_far: Some([1.0, 20.0]), ..map }, 0),
+        ("window beside", MapSettings { frustum: Some([0.2, 1.0, -0.5, 0.5]), ..map }, 255),
+        ("window around", MapSettings { frustum: Some([-0.5, 0.5, -0.5, 0.5]), ..map }, 0),
+    ] {
+        assert_eq!(light(map), expected, "{name}");
+    }
+}
+
+#[test]
+fn shadows_take_what_they_should() {
+    let look_down = || {
+        Picture::mono(View {
+            frustum: Frustum::symmetric(1.2, 1.0, 0.1),
+            ..look("share", Vec3::new(0.0, 1.2, 0.0), Vec3::ZERO, [64, 64])
+        })
+    };
+    let light = Light { shadows: ShadowMethod::Map, ..noon() };
+    for (name, change, value) in [
+        ("all", (|_| ()) as fn(&mut Scene), 0.0),
+        ("half", |s| s.lights[0].shadow_intensity = 0.5, 0.25),
+        ("switched off", |s| s.lights[0].shadows = ShadowMethod::None, 0.5),
+        ("no caster", |s| s.drawables[1].casts_shadow = false, 0.5),
+        ("no receiver", |s| s.drawables[0].receives_shadow = false, 0.5),
+        ("light's own ambient", |s| s.lights[0].ambient_intensity = 0.2, 0.1),
+    ] {
+        let mut scene = ball_over_floor(light.clone());
+        change(&mut scene);
+        assert_colour(shoot(&scene, &look_down()).centre(), [value; 3], name);
+    }
+}
