@@ -1,6 +1,7 @@
 //! The shaders: each is a pass's own WGSL behind the snippets that it uses.
 
-/// Name and parts of every shader; [`module`] joins them.
+/// Name and parts of every shader.
+#[cfg(test)]
 pub(crate) const ALL: &[(&str, &[&str])] =
     &[("surface", SURFACE), ("background", BACKGROUND), ("film", FILM), ("compose", COMPOSE), ("maps", MAPS), ("deform", DEFORM)];
 
@@ -43,4 +44,65 @@ pub(crate) fn module(device: &wgpu::Device, name: &str, parts: &[&str]) -> wgpu:
         label: Some(name),
         source: wgpu::ShaderSource::Wgsl(parts.concat().into()),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{deform, uniforms};
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+    use std::mem::offset_of;
+
+    fn parsed(name: &str, parts: &[&str]) -> naga::Module {
+        let source = parts.concat();
+        let module = naga::front::wgsl::parse_str(&source).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&source)));
+        let valid = Validator::new(ValidationFlags::all(), Capabilities::all()).validate(&module);
+        valid.unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&source)));
+        module
+    }
+
+    #[test]
+    fn all_are_valid() {
+        for (name, parts) in ALL {
+            assert!(!parsed(name, parts).entry_points.is_empty(), "{name}");
+        }
+    }
+
+    /// Size of a Rust struct, and the offsets of its fields.
+    struct Ours(&'static str, &'static str, usize, Vec<(&'static str, usize)>);
+
+    macro_rules! ours {
+        ($shader:literal, $name:literal, $ty:ty, $($field:ident)*) => {
+            Ours($shader, $name, size_of::<$ty>(), vec![$((stringify!($field), offset_of!($ty, $field))),*])
+        };
+    }
+
+    #[test]
+    fn structs_are_laid_out_alike() {
+        for Ours(shader, name, size, fields) in [
+            ours!("surface", "View", uniforms::View, clip_from_world world_from_clip view_from_world eye_in_world viewport
+                first_light light_count exposure shown_light),
+            ours!("surface", "Instance", uniforms::Instance, world_from_object world_from_object_normal flags),
+            ours!("surface", "Texture", uniforms::Texture, linear offset uv_set present),
+            ours!("surface", "Material", uniforms::Material, base_color emissive alpha_cutoff specular exponent metallic
+                roughness normal_scale occlusion_strength ambient shading alpha_mode textures),
+            ours!("surface", "Light", uniforms::Light, position kind direction range color shadow_intensity ambient cos_outer
+                attenuation cone_scale first_face face_count filter_width slope_bias constant_bias),
+            ours!("surface", "MapFace", uniforms::MapFace, map_from_world world_from_map tile light texel),
+            ours!("surface", "Frame", uniforms::Frame, ambient zenith horizon nadir fog_color fog_range fog_kind light_count),
+            ours!("film", "Film", uniforms::Film, color),
+            ours!("deform", "Deformation", deform::Uniform, vertex_count target_count joint_count),
+        ] {
+            let (_, parts) = ALL.iter().find(|(n, _)| *n == shader).unwrap();
+            let module = parsed(shader, parts);
+            let (_, theirs) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
+            let naga::TypeInner::Struct { members, span } = &theirs.inner else { panic!("{name} is no struct") };
+            let members: Vec<_> = members.iter().map(|m| (m.name.clone().unwrap(), m.offset as usize)).collect();
+            let fields: Vec<_> = fields.into_iter().map(|(n, o)| (n.to_owned(), o)).collect();
+            assert_eq!(members, fields, "{name}");
+            // What follows the last field is padding, but an array's stride counts.
+            let rounded = size.next_multiple_of(16);
+            assert!(*span as usize == size || *span as usize == rounded || name == "Deformation", "{name}: {span} {size}");
+        }
+    }
 }

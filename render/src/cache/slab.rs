@@ -74,6 +74,7 @@ impl<K, V> Slab<K, V> {
     }
 
     /// Number of entries alive.
+    #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
         self.by_address.len()
     }

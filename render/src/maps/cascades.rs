@@ -36,6 +36,8 @@ pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, 
         let [near, far] = light.map.near_far.filter(|[n, f]| f > n).unwrap_or([near + at, far + at]);
         return vec![make(window, near, far, light.position)];
     }
+    // A flat floor is a box without height; rounding must not make it vanish.
+    let receivers = Aabb { min: receivers.min - slack, max: receivers.max + slack };
     let mut found: Vec<Projection> = Vec::new();
     for (from, to) in slices(eyes) {
         let mut seen = Aabb::EMPTY;
@@ -61,7 +63,7 @@ pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, 
 /// maps, section 3). Every slice but the first starts at 0 too where views look into different directions, since a map
 /// then holds what is near as well.
 fn slices(eyes: &[Eye]) -> Vec<(f32, f32)> {
-    let far = eyes.iter().map(|e| e.far).fold(0.0, f32::max);
+    let far = eyes.iter().map(|e| e.far).fold(0.0, f32::max) * 1.001;
     let near = eyes.iter().map(|e| e.near).fold(f32::INFINITY, f32::min).max(far * 0.01);
     if far <= 0.0 || near >= far {
         return Vec::new();
