@@ -2,85 +2,15 @@
 //!
 //! [`Navigator`] is plain state and a pure function; [`NavigationNode`] brings it from and to the `Navigation` node.
 
+mod input;
 mod node;
+mod standpoint;
 
+pub use input::{Button, Input, Mode};
 pub use node::NavigationNode;
 
 use glam::{Mat4, Quat, Vec2, Vec3};
-use umbriel_scene::View;
-
-/// How mouse and keys are understood.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Mode {
-    /// Not at all.
-    None,
-    /// The world turns about a centre: drag to orbit, drag with the right or middle button to pan, wheel to zoom.
-    #[default]
-    Examine,
-    /// Keys fly where the view looks; drag to look around.
-    Fly,
-    /// Keys walk on the level; drag to look around.
-    Walk,
-}
-
-impl Input<'_> {
-    fn is_finite(&self) -> bool {
-        match *self {
-            Input::Drag { pixels, .. } => pixels.is_finite(),
-            Input::Wheel { notches, .. } => notches.is_finite(),
-            Input::Keys { direction, haste, dt_s, .. } => direction.is_finite() && haste.is_finite() && dt_s.is_finite(),
-        }
-    }
-}
-
-impl Mode {
-    /// The choices of the field `mode`, as they are spelled.
-    pub const NAMES: [(&'static str, Mode); 4] =
-        [("none", Mode::None), ("examine", Mode::Examine), ("fly", Mode::Fly), ("walk", Mode::Walk)];
-}
-
-/// A button of the mouse.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Button {
-    /// Orbits, or looks around.
-    Left,
-    /// Pans.
-    Middle,
-    /// Pans.
-    Right,
-}
-
-/// What was done with mouse or keys.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Input<'a> {
-    /// The mouse moved by `pixels` (x to the right, y down) with a button held.
-    Drag {
-        /// Which button.
-        button: Button,
-        /// How far.
-        pixels: Vec2,
-        /// Over what.
-        view: &'a View,
-    },
-    /// The wheel turned; up is positive.
-    Wheel {
-        /// How far.
-        notches: f32,
-        /// Over what.
-        view: &'a View,
-    },
-    /// Keys are held since `dt_s` seconds.
-    Keys {
-        /// Each from -1 to 1: x to the right, y up, z back.
-        direction: Vec3,
-        /// Times the usual speed.
-        haste: f32,
-        /// Since when, seconds.
-        dt_s: f32,
-        /// What leads ahead.
-        view: &'a View,
-    },
-}
+use standpoint::Standpoint;
 
 /// Pose of the room in the world, and how it is moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,20 +61,20 @@ impl Navigator {
             (_, input) if !input.is_finite() => {}
             (Mode::Examine, Input::Drag { button: Button::Left, pixels, view }) => {
                 let rad_per_pixel = std::f32::consts::PI / view.size[1].max(1) as f32;
-                self.turn_about(self.room_point(self.center), -pixels * rad_per_pixel, &Eye::of(view));
+                self.turn_about(self.room_point(self.center), -pixels * rad_per_pixel, &Standpoint::of(view));
             }
             (_, Input::Drag { button: Button::Left, pixels, view }) => {
-                let eye = Eye::of(view);
+                let eye = Standpoint::of(view);
                 self.turn_about(eye.position, pixels * eye.pixel_at_1m, &eye);
             }
-            (Mode::Examine, Input::Drag { pixels, view, .. }) => self.pan_with_centre(pixels, &Eye::of(view)),
+            (Mode::Examine, Input::Drag { pixels, view, .. }) => self.pan_with_centre(pixels, &Standpoint::of(view)),
             (_, Input::Drag { pixels, view, .. }) => {
-                let eye = Eye::of(view);
+                let eye = Standpoint::of(view);
                 self.travel(eye.across(-pixels) * (2.0 * self.speed));
             }
-            (Mode::Examine, Input::Wheel { notches, view }) => self.zoom(notches, &Eye::of(view)),
-            (_, Input::Wheel { notches, view }) => self.go(Vec3::NEG_Z * (0.2 * notches), &Eye::of(view)),
-            (_, Input::Keys { direction, haste, dt_s, view }) => self.go(direction * (haste * dt_s), &Eye::of(view)),
+            (Mode::Examine, Input::Wheel { notches, view }) => self.zoom(notches, &Standpoint::of(view)),
+            (_, Input::Wheel { notches, view }) => self.go(Vec3::NEG_Z * (0.2 * notches), &Standpoint::of(view)),
+            (_, Input::Keys { direction, haste, dt_s, view }) => self.go(direction * (haste * dt_s), &Standpoint::of(view)),
         }
         if !(self.position.is_finite() && self.orientation.is_finite() && self.center.is_finite()) {
             *self = before;
@@ -166,7 +96,7 @@ impl Navigator {
     }
 
     /// Goes for some seconds at the usual speed, in the directions of the view (x right, y up, z back). Walking stays level.
-    fn go(&mut self, seconds: Vec3, eye: &Eye) {
+    fn go(&mut self, seconds: Vec3, eye: &Standpoint) {
         let way = if self.mode == Mode::Walk {
             let up = self.up_in_room();
             level(eye.right, up) * seconds.x - level(eye.ahead, up) * seconds.z
@@ -179,7 +109,7 @@ impl Navigator {
     /// Turns the room about a point that keeps its place, by `angles` to the left and upwards. The world is seen to turn the
     /// other way, so that what is far follows a mouse that moves by `angles`, and what is in front of the pivot one that
     /// moves by `-angles`. The horizon stays level.
-    fn turn_about(&mut self, pivot_in_room: Vec3, angles: Vec2, eye: &Eye) {
+    fn turn_about(&mut self, pivot_in_room: Vec3, angles: Vec2, eye: &Standpoint) {
         let up = self.up_in_room();
         let elevation = eye.ahead.dot(up).clamp(-1.0, 1.0).asin();
         let limit = std::f32::consts::FRAC_PI_2 - POLE_MARGIN_RAD;
@@ -191,7 +121,7 @@ impl Navigator {
     }
 
     /// What is as far away as the centre goes along with the mouse; the centre stays where it is in the room.
-    fn pan_with_centre(&mut self, pixels: Vec2, eye: &Eye) {
+    fn pan_with_centre(&mut self, pixels: Vec2, eye: &Standpoint) {
         let centre_in_room = self.room_point(self.center);
         let depth = (centre_in_room - eye.position).dot(eye.ahead).max(eye.near);
         self.travel(eye.across(-pixels) * depth);
@@ -199,7 +129,7 @@ impl Navigator {
     }
 
     /// The centre comes nearer along the line on which it is seen, down to twice the near plane.
-    fn zoom(&mut self, notches: f32, eye: &Eye) {
+    fn zoom(&mut self, notches: f32, eye: &Standpoint) {
         let to_centre = self.room_point(self.center) - eye.position;
         let closest = 2.0 * eye.near;
         let distance = to_centre.length();
@@ -215,41 +145,10 @@ fn level(v: Vec3, up: Vec3) -> Vec3 {
     v.reject_from_normalized(up).normalize_or(v)
 }
 
-/// What a view tells about where it is seen from, in the room.
-struct Eye {
-    position: Vec3,
-    right: Vec3,
-    up: Vec3,
-    ahead: Vec3,
-    /// Height of a pixel at a distance of one metre.
-    pixel_at_1m: f32,
-    near: f32,
-}
-
-impl Eye {
-    fn of(view: &View) -> Eye {
-        let room_from_view = view.view_from_world.inverse();
-        let axis = |v: Vec3| room_from_view.transform_vector3(v).normalize_or_zero();
-        Eye {
-            position: room_from_view.w_axis.truncate(),
-            right: axis(Vec3::X),
-            up: axis(Vec3::Y),
-            ahead: axis(Vec3::NEG_Z),
-            pixel_at_1m: (view.frustum.top - view.frustum.bottom) / (view.frustum.near * view.size[1].max(1) as f32),
-            near: view.frustum.near,
-        }
-    }
-
-    /// The way in the room at a distance of one metre that is seen as `pixels` (y down).
-    fn across(&self, pixels: Vec2) -> Vec3 {
-        (self.right * pixels.x - self.up * pixels.y) * self.pixel_at_1m
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use umbriel_scene::Frustum;
+    use umbriel_scene::{Frustum, View};
 
     const SIZE: [u32; 2] = [1280, 720];
 

@@ -49,9 +49,9 @@ impl Rig {
         Rig::default()
     }
 
-    /// Forgets where the fitted camera stands, for another model.
+    /// Forgets what was seen, for another graph or model: a fitted camera is fitted anew.
     pub fn refit(&mut self) {
-        self.fitted = None;
+        *self = Rig::default();
     }
 
     /// The pictures of `graph` as it is now. `viewpoints` are those of extraction; `bounds_in_world` is what a

@@ -346,3 +346,16 @@ fn a_display_of_a_viewpoint_is_a_stereo_camera() {
     let message = shown(&graph, &mut Rig::new(), None, &[]).unwrap().problems[0].to_string();
     assert!(message.contains("Display `glasses`, field `viewpoint`") && message.contains("not in the world"), "{message}");
 }
+
+#[test]
+fn another_graph_is_seen_anew() {
+    let mut first = new_graph();
+    room(&mut first, "cave");
+    let mut rig = Rig::new();
+    shown(&first, &mut rig, None, &[]).unwrap();
+    let mut second = new_graph();
+    room(&mut second, "wall");
+    rig.refit();
+    let names: Vec<_> = shown(&second, &mut rig, None, &[]).unwrap().pictures.into_iter().map(|p| p.name).collect();
+    assert_eq!(names, ["wall"]);
+}
