@@ -1,10 +1,21 @@
-//! A set of small numbers that gives its lowest member quickly: bits, and bits over the words of bits below, up to one word.
+//! A set of small numbers that gives its lowest member quickly: bits, and bits over the words of bits below, up to one word. One low member
+//! is held apart, so that a chain, which puts one in and takes one out, never waits for the memory.
 
 /// Ordered set of numbers below its capacity.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct BitSet {
     /// `levels[0]` holds the members; a bit of `levels[n + 1]` says that a word of `levels[n]` is not zero. The last level is one word.
     levels: Vec<Vec<u64>>,
+    /// A member that is not among the bits, or `NONE`.
+    held: usize,
+}
+
+const NONE: usize = usize::MAX;
+
+impl Default for BitSet {
+    fn default() -> Self {
+        Self { levels: Vec::new(), held: NONE }
+    }
 }
 
 impl BitSet {
@@ -29,6 +40,21 @@ impl BitSet {
     /// Adds a number below the capacity.
     #[inline]
     pub(crate) fn insert(&mut self, number: usize) {
+        if self.held == NONE {
+            if !self.has_bit(number) {
+                self.held = number;
+            }
+        } else if number < self.held {
+            let held = std::mem::replace(&mut self.held, number);
+            self.clear_bit(number);
+            self.set_bit(held);
+        } else if number != self.held {
+            self.set_bit(number);
+        }
+    }
+
+    #[inline]
+    fn set_bit(&mut self, number: usize) {
         let mut at = number;
         for level in &mut self.levels {
             let word = &mut level[at / 64];
@@ -44,34 +70,50 @@ impl BitSet {
     /// Takes the lowest number out.
     #[inline]
     pub(crate) fn pop_lowest(&mut self) -> Option<usize> {
+        let lowest = self.lowest_bit();
+        if self.held < lowest {
+            return Some(std::mem::replace(&mut self.held, NONE));
+        }
+        if lowest == NONE {
+            return None;
+        }
+        self.clear_bit(lowest);
+        Some(lowest)
+    }
+
+    /// The lowest bit, or `NONE`.
+    #[inline]
+    fn lowest_bit(&self) -> usize {
         let mut at = 0;
         for level in self.levels.iter().rev() {
             let word = level[at];
             if word == 0 {
-                return None;
+                return NONE;
             }
             at = at * 64 + word.trailing_zeros() as usize;
         }
-        let lowest = at;
-        for level in &mut self.levels {
-            let word = &mut level[at / 64];
-            *word &= !(1 << (at % 64));
-            if *word != 0 {
-                break;
-            }
-            at /= 64;
-        }
-        (!self.levels.is_empty()).then_some(lowest)
+        if self.levels.is_empty() { NONE } else { at }
     }
 
     /// True if the number is a member.
     pub(crate) fn contains(&self, number: usize) -> bool {
+        self.held == number || self.has_bit(number)
+    }
+
+    fn has_bit(&self, number: usize) -> bool {
         self.levels.first().and_then(|level| level.get(number / 64)).is_some_and(|word| word >> (number % 64) & 1 == 1)
     }
 
     /// Takes a number out.
     pub(crate) fn remove(&mut self, number: usize) {
-        if !self.contains(number) {
+        if self.held == number {
+            self.held = NONE;
+        }
+        self.clear_bit(number);
+    }
+
+    fn clear_bit(&mut self, number: usize) {
+        if !self.has_bit(number) {
             return;
         }
         let mut at = number;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashSet};
 
-use crate::changes::Revision;
+use crate::changes::{ChangeLog, Revision};
 use crate::evaluation::Evaluation;
 use crate::graph::slot_of;
 use crate::program::{Group, copy_group};
@@ -75,6 +75,15 @@ impl FrameState {
     pub(crate) fn forget(&mut self, slot: u32) {
         self.always.remove(&slot);
         self.asked.remove(&slot);
+    }
+
+    /// Takes the revision that so many copies used, if any did.
+    #[inline]
+    fn copied(&mut self, changes: &mut ChangeLog, copied: usize) {
+        if copied > 0 {
+            changes.next();
+            self.report.copied += copied;
+        }
     }
 }
 
@@ -291,7 +300,32 @@ impl Graph {
     }
 
     /// Copies along the node's routes what was written after a revision.
+    #[inline]
     fn copy_out(&mut self, slot: u32, before: Revision) {
+        if self.schedule.flags[slot as usize] & SILENCED != 0 || !self.copy_out_fast(slot, before) {
+            self.copy_out_slowly(slot, before);
+        }
+    }
+
+    /// Runs a program that is up to date and has only direct copies; false if there is none.
+    #[inline]
+    fn copy_out_fast(&mut self, slot: u32, before: Revision) -> bool {
+        let Some(program) = self.programs.get(slot) else { return false };
+        if program.iter().any(|group| !group.slow.is_empty() || !group.weak.is_empty()) {
+            return false;
+        }
+        for group in program {
+            let written = self.columns.revisions(group.field_type)[group.source as usize];
+            if written > before {
+                let revision = self.changes.last() + 1;
+                let copied = copy_group(&mut self.columns, &mut self.changes, &mut self.schedule, group, written, revision);
+                self.frame.copied(&mut self.changes, copied);
+            }
+        }
+        true
+    }
+
+    fn copy_out_slowly(&mut self, slot: u32, before: Revision) {
         let program = self.programs.take(slot).unwrap_or_else(|| self.compile(self.ids[slot as usize]));
         let silenced = self.schedule.flags[slot as usize] & SILENCED != 0;
         for group in &program {
@@ -320,7 +354,7 @@ impl Graph {
             let value = self.columns.value(group.field_type, group.source);
             copied += group.slow.iter().filter(|route| self.deliver(**route, &value, written, revision)).count();
         }
-        self.copied(copied);
+        self.frame.copied(&mut self.changes, copied);
         if !group.weak.is_empty() {
             self.depart(group);
         }
@@ -334,21 +368,13 @@ impl Graph {
         self.frame.carried.extend(carried);
     }
 
-    /// Takes the revision that so many copies used, if any did.
-    fn copied(&mut self, copied: usize) {
-        if copied > 0 {
-            self.changes.next();
-            self.frame.report.copied += copied;
-        }
-    }
-
     /// Delivers what weak routes carry since the last frame, as one write.
     fn deliver_carried(&mut self) {
         let revision = self.changes.last() + 1;
         let carried = std::mem::take(&mut self.frame.carried);
         let copied =
             carried.iter().filter(|carried| self.deliver(carried.route, &carried.value, carried.written, revision)).count();
-        self.copied(copied);
+        self.frame.copied(&mut self.changes, copied);
     }
 
     /// Delivers a value along a route, unless the target was written later than the source, or a route with a later write was here before.

@@ -46,11 +46,11 @@ fn damper<T: FieldValue + Blend>(name: &str, doc: &str) -> NodeType {
             let tau: f32 = evaluation.get(TAU);
             let left = if tau > 0.0 { (-passed_s / tau as f64).exp() as f32 } else { 0.0 };
             let glided = T::blend(destination, value, left);
-            let rests = !evaluation.written(VALUE_CHANGED) || !(glided.distance(destination) > evaluation.get(TOLERANCE));
-            evaluation.set(VALUE_CHANGED, if rests { destination } else { glided });
-            evaluation.set(IS_ACTIVE, !rests);
+            let moves = evaluation.written(VALUE_CHANGED) && glided.distance(destination) > evaluation.get(TOLERANCE);
+            evaluation.set(VALUE_CHANGED, if moves { glided } else { destination });
+            evaluation.set(IS_ACTIVE, moves);
             evaluation.set(TIME, Time(now));
-            if !rests {
+            if moves {
                 evaluation.again();
             }
         })

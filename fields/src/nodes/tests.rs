@@ -101,7 +101,8 @@ fn keys(fractions: &[f32], values: impl Into<Value>, interpolation: &'static str
 #[test]
 fn interpolators_follow_their_keys() {
     let turn = |angle: f32| Quat::from_rotation_y(angle);
-    let rows: Vec<(&str, Vec<(&str, Value)>, f32, Value)> = vec![
+    type Row = (&'static str, Vec<(&'static str, Value)>, f32, Value);
+    let rows: Vec<Row> = vec![
         ("ScalarInterpolator", keys(&[0.0, 1.0, 3.0], vec![0.0f32, 10.0, 30.0], "linear"), 2.0, 20.0f32.into()),
         ("ScalarInterpolator", keys(&[0.0, 1.0, 3.0], vec![0.0f32, 10.0, 30.0], "linear"), -5.0, 0.0f32.into()),
         ("ScalarInterpolator", keys(&[0.0, 1.0, 3.0], vec![1.0f32, 10.0, 30.0], "linear"), 5.0, 30.0f32.into()),

@@ -299,13 +299,15 @@ fn modes_always_and_pull() {
     assert_eq!(frame(&mut graph).evaluated, 0);
 }
 
+type Act = Box<dyn FnMut(&mut Graph)>;
+
 /// Writes down what it is told, and does what it was asked to do by token or node.
 #[derive(Default)]
 struct Recorder {
     told: Vec<(FieldId, u64)>,
     evaluated: Vec<NodeId>,
-    on_change: HashMap<u64, Box<dyn FnMut(&mut Graph)>>,
-    on_evaluate: HashMap<NodeId, Box<dyn FnMut(&mut Graph)>>,
+    on_change: HashMap<u64, Act>,
+    on_evaluate: HashMap<NodeId, Act>,
 }
 
 impl Host for Recorder {
