@@ -123,6 +123,13 @@ fn any_mesh_under_any_light() {
         ),
         ("mirrored", vec![a_box().under(tilt * Mat4::from_scale(Vec3::new(-1.0, 1.2, 0.8)))]),
         ("mirrored and open", vec![lidless().under(tilt * Mat4::from_scale(Vec3::new(0.9, -1.0, 0.8)))]),
+        (
+            "deformed",
+            vec![
+                sphere(0.8, 16, 8).deformed(|p| p * (1.0 + 0.3 * (5.0 * p.y).sin()) + Vec3::X * p.y * p.y).at(up),
+                lidless().deformed(|p| p + Vec3::Z * 0.4 * p.y).at(Vec3::new(-0.9, 0.9, 0.4)),
+            ],
+        ),
         ("flattened by its matrix", vec![sphere(0.9, 12, 6).under(tilt * Mat4::from_scale(Vec3::new(1.0, 0.0, 1.0)))]),
         (
             "overlapping, one mirrored",
@@ -171,7 +178,7 @@ impl Random {
 
 #[test]
 fn the_eye_anywhere() {
-    let casters = vec![
+    let mut casters = vec![
         cuboid(Vec3::new(0.9, 0.3, 0.8)).at(Vec3::Y * 2.0),
         cuboid(Vec3::new(0.5, 0.4, 0.5)).edited(|_, i| i.truncate(30)).at(Vec3::new(0.7, 0.6, -0.5)),
         sheet(0.7).at(Vec3::new(-0.9, 1.3, 0.3)),
@@ -185,6 +192,7 @@ fn the_eye_anywhere() {
         let at = random.around(Vec3::new(0.0, 0.3, 0.0), Vec3::splat(2.0));
         let near = [0.02, 0.1, 0.4][i / 3 % 3];
         let view = looking(eye, at, random.off_axis(near));
+        casters.iter_mut().for_each(|c| c.bounds_known = i % 2 == 0);
         let score = compare(&mut gpus, &casters, &room(), toward_light, &view);
         let share = score.wrong as f64 / score.counted.max(1) as f64;
         assert!(share <= ALLOWED, "view {i} from {eye}: {} of {} wrong", score.wrong, score.counted);

@@ -27,14 +27,16 @@ impl MeshCache {
     /// The parts of a mesh; none where it has no triangle with an area of its own.
     pub(super) fn parts(&mut self, device: &wgpu::Device, mesh: &Arc<Mesh>) -> &[Arc<GpuPart>] {
         let upload = || {
-            let parts = parts::parts(mesh);
-            if parts.len() == 1 && parts[0].layers > parts::STENCIL_LAYERS {
-                tracing::debug!(
+            let limits = device.limits();
+            let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+            let (fit, too_large): (Vec<_>, Vec<_>) = parts::parts(mesh).into_iter().partition(|p| p.largest_list() <= limit);
+            if !too_large.is_empty() {
+                tracing::warn!(
                     mesh = mesh.name,
-                    "loose pieces may put more than {} layers of shadow over a point; at an exact multiple it would be lit",
-                    parts::STENCIL_LAYERS
+                    "mesh casts no shadow volume: its edges do not fit into a buffer of {limit} bytes"
                 );
             }
+            let parts = if too_large.is_empty() { fit } else { Vec::new() };
             (Arc::downgrade(mesh), parts.iter().map(|p| Arc::new(GpuPart::new(device, p))).collect())
         };
         &self.meshes.entry(Arc::as_ptr(mesh)).or_insert_with(upload).1

@@ -283,7 +283,7 @@ impl Capacity {
     /// the far fan (a far cap per triangle needs less).
     fn new(part: &GpuPart, local_light: bool) -> Capacity {
         let per_side = if local_light { 9 } else { 3 };
-        Capacity { sides: 3 * per_side * part.triangle_count, caps: 3 * part.triangle_count }
+        Capacity { sides: part.triangle_count.saturating_mul(3 * per_side), caps: part.triangle_count.saturating_mul(3) }
     }
 
     fn bytes(&self) -> u64 {
@@ -291,7 +291,7 @@ impl Capacity {
     }
 
     fn empty_draws(&self) -> [Draw; 3] {
-        let first = [0, self.sides, self.sides + self.caps];
+        let first = [0, self.sides, self.sides.saturating_add(self.caps)];
         first.map(|first_index| Draw { instance_count: 1, first_index, ..Draw::default() })
     }
 }

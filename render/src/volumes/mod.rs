@@ -6,6 +6,11 @@
 //! where they lie behind the visible surface (z-fail, 000 section 3.2) and reach to infinity by w = 0 in world space.
 //!
 //! After [`VolumePass::draw`] the stencil is not 0 exactly where the job's light is hidden by one of the job's casters.
+//! The stencil counts layers of shadow in eight bits. Jobs that may hold more are drawn in groups of at most 127 layers,
+//! after each of which the eighth bit remembers what is in shadow: any number of casters, and of pieces of a mesh, is
+//! exact. What remains is a single connected surface (or a mesh of very many loose pieces, see
+//! [`VolumeStats::may_wrap`]) that by itself puts exactly 128 or 256 layers between a point and the light.
+//!
 //! Alpha-tested casters throw the shadow of their whole triangles.
 //!
 //! This module knows nothing of lighting, materials or how the stencil is used afterwards.
@@ -62,6 +67,9 @@ pub struct VolumeStats {
     pub kept: usize,
     /// Casters left out: no triangles, a position buffer that is too small, or lists too large for the device.
     pub left_out: usize,
+    /// Lists of meshes with so many loose pieces that these may put more than 255 layers over a point. Where it is an
+    /// exact multiple of 128, the point is lit.
+    pub may_wrap: usize,
 }
 
 /// Makes and draws the volumes of all jobs of a frame.
@@ -104,12 +112,12 @@ impl VolumePass {
             let mut lists = Vec::new();
             for caster in &job.casters {
                 let vertex_count = caster.mesh.positions.len() as u32;
-                let parts = self.meshes.parts(device, &caster.mesh);
-                if parts.is_empty() || caster.positions.size() < 12 * u64::from(vertex_count) {
+                let pieces = self.meshes.parts(device, &caster.mesh);
+                if pieces.is_empty() || caster.positions.size() < 12 * u64::from(vertex_count) {
                     stats.left_out += 1;
                     continue;
                 }
-                for part in parts {
+                for part in pieces {
                     let wanted = Wanted {
                         light: &job.light,
                         part,
@@ -119,6 +127,7 @@ impl VolumePass {
                         bounds_in_world: &caster.bounds_in_world,
                         vertex_count,
                     };
+                    stats.may_wrap += usize::from(part.layers > parts::STENCIL_LAYERS);
                     match self.extract.lists(device, &wanted, old.take(part)) {
                         Some((made, anew)) => {
                             if anew {

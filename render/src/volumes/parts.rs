@@ -24,6 +24,15 @@ pub(super) struct Part {
     pub(super) layers: u32,
 }
 
+impl Part {
+    /// Size of its longest list, bytes.
+    pub(super) fn largest_list(&self) -> u64 {
+        let lists: [&[u8]; 3] =
+            [bytemuck::cast_slice(&self.triangles), bytemuck::cast_slice(&self.edges), bytemuck::cast_slice(&self.incidences)];
+        lists.iter().map(|l| l.len() as u64).max().unwrap_or(0)
+    }
+}
+
 /// Cuts a mesh into parts of at most [`GROUP_LAYERS`] layers each, or into a single one where [`STENCIL_LAYERS`] do.
 pub(super) fn parts(mesh: &Mesh) -> Vec<Part> {
     let edges = Edges::of_mesh(mesh);

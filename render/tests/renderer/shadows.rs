@@ -72,6 +72,8 @@ fn a_ball_throws_the_shadow_that_geometry_says() {
             let (share, dark) = agreement("ball_map", light, 0.02);
             assert!(share > 0.9995 && dark > 1000, "{name} {filter:?}: {share} of the floor is right, {dark} in shadow");
         }
+        let (share, dark) = agreement("ball_volume", Light { shadows: ShadowMethod::Volume, ..light }, 0.005);
+        assert!(share == 1.0 && dark > 1000, "{name} volume: {share} of the floor is right, {dark} in shadow");
     }
 }
 
@@ -108,14 +110,14 @@ fn settings_by_hand_are_obeyed() {
     }
 }
 
+/// From below the ball to the floor, the middle of its shadow ahead.
+fn look_down() -> Picture {
+    let frustum = Frustum::symmetric(1.2, 1.0, 0.1);
+    Picture::mono(View { frustum, ..look("share", Vec3::new(0.0, 1.2, 0.0), Vec3::ZERO, [64, 64]) })
+}
+
 #[test]
 fn shadows_take_what_they_should() {
-    let look_down = || {
-        Picture::mono(View {
-            frustum: Frustum::symmetric(1.2, 1.0, 0.1),
-            ..look("share", Vec3::new(0.0, 1.2, 0.0), Vec3::ZERO, [64, 64])
-        })
-    };
     let light = Light { shadows: ShadowMethod::Map, ..noon() };
     for (name, change, value) in [
         ("all", (|_| ()) as fn(&mut Scene), 0.0),
@@ -128,5 +130,36 @@ fn shadows_take_what_they_should() {
         let mut scene = ball_over_floor(light.clone());
         change(&mut scene);
         assert_colour(shoot(&scene, &look_down()).centre(), [value; 3], name);
+    }
+}
+
+#[test]
+fn stencil_groups_and_methods_work_together() {
+    let light = Light { direction: Vec3::NEG_Y, ..noon() };
+    let film = StencilMode::Modulative(Film { color: glam::Vec4::new(0.0, 0.0, 1.0, 0.25) });
+    let group = |light, casters: Vec<usize>, mode| StencilGroup { name: "group".into(), light, casters, mode };
+    let with = |method| Light { shadows: method, ..light.clone() };
+    let side = Light { direction: Vec3::new(1.0, -1.0, 0.0).normalize(), ..light.clone() };
+    let slanted = 0.5 * 0.5f32.sqrt();
+    use ShadowMethod::{Map, None, Volume};
+    type Row = (&'static str, Vec<Light>, Vec<StencilGroup>, [f32; 3]);
+    let rows: Vec<Row> = vec![
+        ("no shadow", vec![with(None)], vec![], [0.5; 3]),
+        ("volume", vec![with(Volume)], vec![], [0.0; 3]),
+        ("additive group", vec![with(None)], vec![group(0, vec![1], StencilMode::Additive)], [0.0; 3]),
+        ("additive group without casters", vec![with(None)], vec![group(0, vec![], StencilMode::Additive)], [0.5; 3]),
+        ("additive group of a mapped light", vec![with(Map)], vec![group(0, vec![1], StencilMode::Additive)], [0.0; 3]),
+        ("film", vec![with(None)], vec![group(0, vec![1], film)], [0.375, 0.375, 0.625]),
+        ("two films of a caster", vec![with(None)], vec![group(0, vec![1, 1], film)], [0.375, 0.375, 0.625]),
+        ("volume and another light", vec![with(Volume), side.clone()], vec![], [slanted; 3]),
+        ("map and volume", vec![with(Map), with(Volume)], vec![], [0.0; 3]),
+        ("two volumes", vec![with(Volume), Light { shadows: Volume, ..side.clone() }], vec![], [slanted; 3]),
+        ("film of one, volume of the other", vec![with(Volume), side], vec![group(1, vec![1], film)], [slanted; 3]),
+    ];
+    for (name, lights, stencil_groups, colour) in rows {
+        let scene = Scene { lights, stencil_groups, ..ball_over_floor(light.clone()) };
+        let shot = shoot(&scene, &look_down());
+        assert_eq!(shot.problems, Vec::<String>::new(), "{name}");
+        assert_colour(shot.centre(), colour, name);
     }
 }

@@ -110,38 +110,41 @@ pub(crate) fn view_of(json: &Value) -> View {
     }
 }
 
+/// Draws what a light lets through with the given method and compares it with the truth.
+fn score_of(samples: &Path, scene: &mut Scene, name: &str, shadows: ShadowMethod) -> Score {
+    let json = std::fs::read_to_string(samples.join(format!("worlds/scenes/{name}.json"))).unwrap();
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let truth = image::open(samples.join(format!("gt/{name}_mask.png"))).unwrap().into_luma8();
+    let truth = Mask::from_grey(truth.width(), truth.height(), truth.as_raw()).unwrap();
+    let view = View { name: format!("{name}_{shadows:?}"), ..view_of(&json) };
+    scene.lights = vec![Light { shadows, ..light_of(&json["light"]) }];
+    shoot(scene, &Picture { name: format!("{}_colour", view.name), ..Picture::mono(view.clone()) });
+    let shot = shoot(scene, &Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view.clone()) });
+    assert_eq!(shot.problems, Vec::<String>::new());
+    let grey: Vec<u8> = shot.layers[0].rgba.chunks_exact(4).map(|p| p[0]).collect();
+    let score = score(&truth, &grey).unwrap();
+    println!("{name} {shadows:?}: IoU {:.4}, {:.3} % disagree", score.iou, score.disagreement * 100.0);
+    let rgba = difference(&truth, &grey).unwrap();
+    keep(&format!("{}_difference", view.name), &[umbriel_render::RgbaPixels { rgba, ..shot.layers[0].clone() }]);
+    score
+}
+
 #[test]
-fn maps_agree_with_ray_tracing() {
+fn shadows_agree_with_ray_tracing() {
     let Some(samples) = samples() else { return };
     let mut scene = load(&samples.join("worlds/town_square.glb"));
     scene.ambient = Vec3::splat(0.1);
     scene.background = Background { zenith: Vec3::new(0.1, 0.2, 0.6), horizon: Vec3::splat(0.6), nadir: Vec3::splat(0.1) };
     let mut failed = Vec::new();
-    for (light, camera, least) in [
-        ("sun", "overview", 0.98),
-        ("sun", "eye_level", 0.98),
-        ("spot", "overview", 0.98),
-        ("spot", "eye_level", 0.98),
-        ("lamp", "overview", 0.98),
-        ("lamp", "eye_level", 0.98),
-    ] {
-        let name = format!("town_square__{light}__{camera}");
-        let json = std::fs::read_to_string(samples.join(format!("worlds/scenes/{name}.json"))).unwrap();
-        let json: Value = serde_json::from_str(&json).unwrap();
-        let truth = image::open(samples.join(format!("gt/{name}_mask.png"))).unwrap().into_luma8();
-        let truth = Mask::from_grey(truth.width(), truth.height(), truth.as_raw()).unwrap();
-        let view = View { name: name.clone(), ..view_of(&json) };
-        let map = MapSettings { size: 2048, ..Default::default() };
-        scene.lights = vec![Light { shadows: ShadowMethod::Map, map, ..light_of(&json["light"]) }];
-        shoot(&scene, &Picture { name: format!("{name}_colour"), ..Picture::mono(view.clone()) });
-        let shot = shoot(&scene, &Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view) });
-        let grey: Vec<u8> = shot.layers[0].rgba.chunks_exact(4).map(|p| p[0]).collect();
-        let score = score(&truth, &grey).unwrap();
-        println!("{name}: IoU {:.4}, {:.3} % disagree, {:?}", score.iou, score.disagreement * 100.0, shot.stats);
-        let difference = difference(&truth, &grey).unwrap();
-        keep(&format!("{name}_difference"), &[umbriel_render::RgbaPixels { rgba: difference, ..shot.layers[0].clone() }]);
-        if score.iou < least {
-            failed.push((name, score.iou));
+    for (shadows, least) in [(ShadowMethod::Map, 0.98), (ShadowMethod::Volume, 0.98)] {
+        for light in ["sun", "spot", "lamp"] {
+            for camera in ["overview", "eye_level"] {
+                let name = format!("town_square__{light}__{camera}");
+                let score = score_of(&samples, &mut scene, &name, shadows);
+                if score.iou < least {
+                    failed.push((name, shadows, score.iou));
+                }
+            }
         }
     }
     assert!(failed.is_empty(), "{failed:?}");

@@ -61,12 +61,16 @@ pub(crate) struct Loaded {
 impl Loaded {
     pub(crate) fn caster(&self) -> VolumeCaster {
         VolumeCaster {
-            mesh: self.thing.mesh.clone(),
+            mesh: self.thing.at_rest.clone(),
             positions: self.positions.clone(),
             positions_revision: self.revision,
             world_from_object: self.thing.world_from_object,
-            bounds_in_world: Aabb::from_points(self.thing.mesh.positions.iter().copied())
-                .transformed(&self.thing.world_from_object),
+            bounds_in_world: if self.thing.bounds_known {
+                let bounds = Aabb::from_points(self.thing.mesh.positions.iter().copied());
+                bounds.transformed(&self.thing.world_from_object)
+            } else {
+                Aabb::EMPTY
+            },
         }
     }
 }

@@ -8,8 +8,12 @@ use umbriel_scene::Mesh;
 /// A mesh at a place.
 #[derive(Clone)]
 pub(crate) struct Thing {
+    /// As it is seen.
     pub(crate) mesh: Arc<Mesh>,
+    /// Before it was deformed.
+    pub(crate) at_rest: Arc<Mesh>,
     pub(crate) world_from_object: Mat4,
+    pub(crate) bounds_known: bool,
 }
 
 impl Thing {
@@ -28,11 +32,18 @@ impl Thing {
         edit(&mut positions, &mut indices);
         Thing { world_from_object: self.world_from_object, ..soup(positions, indices) }
     }
+
+    /// Moves vertices as a skin or a morph target does.
+    pub(crate) fn deformed(mut self, to: impl Fn(Vec3) -> Vec3) -> Thing {
+        Arc::make_mut(&mut self.mesh).positions = self.at_rest.positions.iter().map(|p| to(*p)).collect();
+        self
+    }
 }
 
 pub(crate) fn soup(positions: Vec<Vec3>, indices: Vec<u32>) -> Thing {
     let mesh = Mesh { positions: positions.into(), indices: indices.into(), ..Mesh::default() };
-    Thing { mesh: Arc::new(mesh), world_from_object: Mat4::IDENTITY }
+    let mesh = Arc::new(mesh);
+    Thing { at_rest: mesh.clone(), mesh, world_from_object: Mat4::IDENTITY, bounds_known: true }
 }
 
 /// All triangles of several things in one mesh.
