@@ -14,6 +14,9 @@ const FIELD_OF_VIEW_RAD: f32 = 0.7;
 /// Width over height for which the camera is fitted; wider windows show more at the sides.
 const ASPECT: f32 = 4.0 / 3.0;
 
+/// So many of a model's own lights cast shadows; maps of more would fill a small device.
+const SHADOWED_LIGHTS: usize = 4;
+
 /// Why a model cannot be shown.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
@@ -40,6 +43,9 @@ pub(crate) fn show(graph: &mut Graph, path: &Path) -> Result<(), Error> {
     let mut children = vec![viewpoint(graph, &bounds)?, model.root, ground(graph, &bounds)?];
     if model.lights.is_empty() {
         children.push(sun(graph)?);
+    }
+    for light in model.lights.iter().take(SHADOWED_LIGHTS) {
+        graph.set_named(*light, "shadows", "map")?;
     }
     Ok(set_children(graph, world, &children)?)
 }

@@ -75,7 +75,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
         (
             "flat_screen",
             r#"make("Display", #{ name: "wall", screens: [make("Screen", #{ name: "flat", lower_left: vec3(0,0,0), lower_right: vec3(0,0,0), upper_left: vec3(0,1,0) })], user: make("User") });"#,
-            &["wall"],
+            &["flat", "no area"],
         ),
     ];
     for (name, line, expected) in rows {
@@ -108,7 +108,7 @@ fn a_wrong_world_ends_with_a_message() {
         ("endless", "loop {}", &["endless.rhai:1"]),
         (
             "strong_loop",
-            "let a = make(\"Sum\"); let b = make(\"Sum\");\nroute(a, \"output\", b, \"a\");\nroute(b, \"output\", a, \"a\");",
+            "let a = make(\"Sum\"); let b = make(\"Sum\");\nroute(a, \"value\", b, \"a\");\nroute(b, \"value\", a, \"a\");",
             &["strong_loop.rhai:3", "weak"],
         ),
     ];

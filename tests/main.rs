@@ -4,5 +4,6 @@ mod command;
 mod layers;
 mod shadows;
 mod support;
+mod views;
 mod window;
 mod worlds;
