@@ -30,6 +30,7 @@ mod nodes;
 mod observe;
 mod order;
 mod program;
+mod propagate;
 mod registry;
 mod route;
 mod schedule;
