@@ -3,11 +3,10 @@
 struct Caster {
     world_from_object: mat4x4<f32>,
     toward_light: vec4<f32>,
-    apex: vec4<f32>,
     triangle_count: u32,
     edge_count: u32,
-    vertex_count: u32,
     flags: u32,
+    unused: u32,
 };
 
 @group(1) @binding(0) var<uniform> caster: Caster;
@@ -20,9 +19,6 @@ struct Placed {
 @vertex
 fn place(@builtin(vertex_index) index: u32) -> Placed {
     let i = index >> 1u;
-    if i >= caster.vertex_count {
-        return Placed(clip_from_point(view.clip_from_world, caster.apex));
-    }
     let p_in_object = vec3<f32>(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]);
     let p = world_from_vertex(caster.world_from_object, p_in_object);
     if (index & 1u) == 0u {

@@ -13,7 +13,6 @@ pub(super) const SHADER: &str = concat!(include_str!("../shaders/position.wgsl")
 
 const EVERY_TRIANGLE: u32 = 1;
 const MIRRORED: u32 = 2;
-const FAR_FAN: u32 = 4;
 
 /// `Caster` of the shaders.
 #[repr(C)]
@@ -21,25 +20,20 @@ const FAR_FAN: u32 = 4;
 pub(super) struct CasterUniform {
     world_from_object: Mat4,
     toward_light: Vec4,
-    apex: Vec4,
     triangle_count: u32,
     edge_count: u32,
-    vertex_count: u32,
     flags: u32,
+    unused: u32,
 }
 
 impl CasterUniform {
-    fn new(light: &VolumeLight, world_from_object: Mat4, bounds: &Aabb, part: &GpuPart, vertex_count: u32) -> CasterUniform {
-        let local = light.toward_light.w != 0.0;
-        let from_light = bounds.centre() - light.toward_light.truncate();
-        // A light outside of the sphere around the caster sees it within less than half of all directions.
-        let outside = !bounds.is_empty() && from_light.length() > bounds.radius() * 1.001;
+    fn new(light: &VolumeLight, world_from_object: Mat4, bounds: &Aabb, part: &GpuPart) -> CasterUniform {
+        // Of a closed surface the near side is enough only while the light is outside of it.
+        let (p, margin) = (light.toward_light.truncate(), 1e-3 * bounds.radius());
+        let outside = p.cmplt(bounds.min - margin).any() || p.cmpgt(bounds.max + margin).any();
         let mut flags = 0;
-        if local && !outside {
+        if light.toward_light.w != 0.0 && (bounds.is_empty() || !outside) {
             flags |= EVERY_TRIANGLE;
-        }
-        if local && outside {
-            flags |= FAR_FAN;
         }
         if world_from_object.determinant() < 0.0 {
             flags |= MIRRORED;
@@ -47,11 +41,10 @@ impl CasterUniform {
         CasterUniform {
             world_from_object,
             toward_light: light.toward_light,
-            apex: if local && outside { from_light.normalize().extend(0.0) } else { Vec4::ZERO },
             triangle_count: part.triangle_count,
             edge_count: part.edge_count,
-            vertex_count,
             flags,
+            unused: 0,
         }
     }
 }
@@ -105,7 +98,6 @@ pub(super) struct Wanted<'a> {
     pub(super) positions_revision: u64,
     pub(super) world_from_object: Mat4,
     pub(super) bounds_in_world: &'a Aabb,
-    pub(super) vertex_count: u32,
 }
 
 /// Pipelines of the two steps.
@@ -186,13 +178,7 @@ impl Extract {
     /// [`Extract::run`]. `None` where the device cannot hold them.
     pub(super) fn lists(&self, device: &wgpu::Device, wanted: &Wanted<'_>, old: Option<Lists>) -> Option<(Lists, bool)> {
         let key = Key {
-            uniform: CasterUniform::new(
-                wanted.light,
-                wanted.world_from_object,
-                wanted.bounds_in_world,
-                wanted.part,
-                wanted.vertex_count,
-            ),
+            uniform: CasterUniform::new(wanted.light, wanted.world_from_object, wanted.bounds_in_world, wanted.part),
             positions: wanted.positions.clone(),
             positions_revision: wanted.positions_revision,
         };
@@ -279,11 +265,11 @@ struct Capacity {
 }
 
 impl Capacity {
-    /// Every side of every triangle may stand alone: one triangle to infinity under parallel light, else two and one of
-    /// the far fan (a far cap per triangle needs less).
+    /// Every side of every triangle may stand alone: as one triangle to infinity under parallel light, else as two, with
+    /// a far cap for each triangle.
     fn new(part: &GpuPart, local_light: bool) -> Capacity {
-        let per_side = if local_light { 9 } else { 3 };
-        Capacity { sides: part.triangle_count.saturating_mul(3 * per_side), caps: part.triangle_count.saturating_mul(3) }
+        let per_triangle = if local_light { 3 * 6 + 3 } else { 3 * 3 };
+        Capacity { sides: part.triangle_count.saturating_mul(per_triangle), caps: part.triangle_count.saturating_mul(3) }
     }
 
     fn bytes(&self) -> u64 {

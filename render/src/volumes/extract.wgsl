@@ -1,21 +1,17 @@
 // The volume of one caster under one light: lists of indices and the arguments of the draws that read them.
-// Vertex i of the mesh is index 2i where it is and 2i + 1 thrown to infinity, away from the light. The index
-// 2 * vertex_count stands for the apex, a direction in the middle of the shadow.
+// Vertex i of the mesh is index 2i where it is and 2i + 1 thrown to infinity, away from the light.
 
 const EVERY_TRIANGLE = 1u;
 const MIRRORED = 2u;
-const FAR_FAN = 4u;
 
 struct Caster {
     world_from_object: mat4x4<f32>,
     // w = 1: position of the light. w = 0: direction towards it.
     toward_light: vec4<f32>,
-    // w = 0: where the far fans meet.
-    apex: vec4<f32>,
     triangle_count: u32,
     edge_count: u32,
-    vertex_count: u32,
     flags: u32,
+    unused: u32,
 };
 
 struct Draw {
@@ -106,7 +102,8 @@ fn turn_triangles(
         put(atomicSub(&draws.turned_caps.first_index, 3u) - 3u, 2u * t.x, 2u * t.y, 2u * t.z);
         atomicAdd(&draws.turned_caps.index_count, 3u);
     }
-    if caster.toward_light.w != 0.0 && (caster.flags & FAR_FAN) == 0u {
+    // The far cap looks away from the light. Parallel light has none: all its points are one.
+    if caster.toward_light.w != 0.0 {
         let second = select(t.y, t.z, c > 0);
         let third = select(t.z, t.y, c > 0);
         put(atomicAdd(&draws.sides.index_count, 3u), 2u * t.x + 1u, 2u * second + 1u, 2u * third + 1u);
@@ -145,15 +142,10 @@ fn raise_edges(
         }
         return;
     }
-    let fan = (caster.flags & FAR_FAN) != 0u;
-    let stride = select(6u, 9u, fan);
-    var at = atomicAdd(&draws.sides.index_count, stride * times);
+    var at = atomicAdd(&draws.sides.index_count, 6u * times);
     for (var k = 0u; k < times; k++) {
         put(at, p, q, q + 1u);
         put(at + 3u, p, q + 1u, p + 1u);
-        if fan {
-            put(at + 6u, p + 1u, q + 1u, 2u * caster.vertex_count);
-        }
-        at += stride;
+        at += 6u;
     }
 }

@@ -111,9 +111,8 @@ impl VolumePass {
             let mut old = OldLists::new(old_jobs.next().unwrap_or_default());
             let mut lists = Vec::new();
             for caster in &job.casters {
-                let vertex_count = caster.mesh.positions.len() as u32;
                 let pieces = self.meshes.parts(device, &caster.mesh);
-                if pieces.is_empty() || caster.positions.size() < 12 * u64::from(vertex_count) {
+                if pieces.is_empty() || caster.positions.size() < 12 * caster.mesh.positions.len() as u64 {
                     stats.left_out += 1;
                     continue;
                 }
@@ -125,7 +124,6 @@ impl VolumePass {
                         positions_revision: caster.positions_revision,
                         world_from_object: caster.world_from_object,
                         bounds_in_world: &caster.bounds_in_world,
-                        vertex_count,
                     };
                     stats.may_wrap += usize::from(part.layers > parts::STENCIL_LAYERS);
                     match self.extract.lists(device, &wanted, old.take(part)) {

@@ -163,3 +163,60 @@ fn stencil_groups_and_methods_work_together() {
         assert_colour(shot.centre(), colour, name);
     }
 }
+
+#[test]
+fn maps_are_kept_while_light_and_casters_move_as_one() {
+    let lamp = Vec3::new(0.8, 5.0, -0.6);
+    let towards = (CENTRE - lamp).normalize();
+    let spot = LightKind::Spot { inner_rad: 0.1, outer_rad: 0.6 };
+    for kind in [LightKind::Directional, spot, LightKind::Point] {
+        let map = MapSettings { size: 512, ..Default::default() };
+        let light =
+            Light { kind, position: lamp, direction: towards, shadows: ShadowMethod::Map, map, intensity: 20.0, ..noon() };
+        let still = ball_over_floor(light);
+        let picture = Picture::mono(look("kept", Vec3::new(3.0, 4.0, 6.0), Vec3::ZERO, [120, 90]));
+        let moved = |m: Mat4| {
+            let mut scene = still.clone();
+            for d in &mut scene.drawables {
+                *d = shape_of(&d.mesh, &d.material, m * d.world_from_object);
+            }
+            scene.lights[0].position = m.transform_point3(lamp);
+            scene.lights[0].direction = m.transform_vector3(towards);
+            scene
+        };
+        let turn = Mat4::from_translation(Vec3::new(0.3, 0.1, -0.2)) * Mat4::from_rotation_y(1.1);
+        let mut one_slipped = moved(turn);
+        let slipped = at(0.3, 0.0, 0.0) * one_slipped.drawables[1].world_from_object;
+        one_slipped.drawables[1] = shape_of(&still.drawables[1].mesh, &still.drawables[1].material, slipped);
+        let mut light_moved = moved(turn);
+        light_moved.lights[0].position.x += 0.3;
+        light_moved.lights[0].direction = (light_moved.lights[0].direction + Vec3::X * 0.1).normalize();
+        let mut gone = light_moved.clone();
+        gone.drawables[1].visible = false;
+        let steps = [
+            ("first", still.clone(), true),
+            ("same", still.clone(), false),
+            ("all turned", moved(turn), kind == LightKind::Directional),
+            ("one slipped", one_slipped, true),
+            ("light moved", light_moved, true),
+            ("caster gone", gone.clone(), true),
+            ("same again", gone, false),
+        ];
+        let (turn_of_test, gpu) = gpu();
+        let mut renderer = umbriel_render::Renderer::new(gpu).unwrap();
+        let mut pictures = Vec::new();
+        for (name, scene, is_redrawn) in steps {
+            let stats = renderer.render(&scene, std::slice::from_ref(&picture)).unwrap();
+            // A directional light's maps follow the views, so a turned world may need others.
+            let may_be_either = name == "all turned" && kind == LightKind::Directional;
+            assert!(may_be_either || (stats.map_redraws > 0) == is_redrawn, "{kind:?}, {name}: {stats:?}");
+            pictures.push((name, scene, renderer.read_back(0).unwrap()));
+        }
+        drop(turn_of_test);
+        for (name, scene, layers) in pictures {
+            let fresh = shoot(&scene, &picture);
+            let differ = fresh.layers[0].rgba.iter().zip(&layers[0].rgba).filter(|(a, b)| a.abs_diff(**b) > 40).count();
+            assert!(differ < 100, "{kind:?}, {name}: {differ} bytes differ from a picture with fresh maps");
+        }
+    }
+}
