@@ -98,7 +98,7 @@ impl Session {
         size: [u32; 2],
         windows: &WindowSizes,
     ) -> Result<Vec<Picture>, umbriel_displays::Error> {
-        let bounds = bounds(&self.scene);
+        let bounds = bounds(&self.scene).transformed(&self.extractor.world_from_room());
         let wanted = Wanted { view, size, windows };
         let found = self.rig.pictures(self.world.graph(), self.extractor.viewpoints(), &bounds, &wanted)?;
         self.problems.extend(found.problems.iter().map(ToString::to_string));
@@ -138,7 +138,7 @@ impl Session {
     }
 
     fn try_navigate(&mut self, input: Input<'_>) -> Result<(), umbriel_displays::Error> {
-        let centre = bounds(&self.scene).centre();
+        let centre = bounds(&self.scene).transformed(&self.extractor.world_from_room()).centre();
         let graph = self.world.graph_mut();
         let node = match self.navigation {
             Some(node) if graph.contains(node.node) => node,
