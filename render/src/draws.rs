@@ -3,7 +3,7 @@
 use crate::cache::{GpuMaterial, GpuMesh, Slab};
 use crate::cull::{CentredBox, Planes};
 use crate::uniforms::Instance;
-use glam::{Mat3, Mat4};
+use glam::{Mat3, Mat4, Vec3};
 use umbriel_scene::{AlphaMode, Drawable, Material, Mesh, Topology};
 
 /// What a pipeline is chosen by.
@@ -68,6 +68,17 @@ pub(crate) struct Draws {
     /// Instances that some view sees, view after view.
     pub(crate) visible: Vec<u32>,
     is_sorted: bool,
+}
+
+/// A drawable that casts, as shadow maps remember it.
+#[derive(Clone, Debug)]
+pub(crate) struct Caster {
+    /// Mesh, material and revision of the deformation.
+    pub(crate) content: [u64; 3],
+    pub(crate) world_from_object: Mat4,
+    /// Middle of the mesh at rest, and how far it reaches from there, in the space of the object.
+    pub(crate) centre: Vec3,
+    pub(crate) reach: f32,
 }
 
 /// GPU copies that drawables are looked up in.
@@ -219,6 +230,18 @@ impl Draws {
     /// Numbers of the drawables that are drawn, with whether they cast.
     pub(crate) fn drawn(&self) -> impl Iterator<Item = (usize, bool)> + '_ {
         self.slots.iter().enumerate().filter(|(_, s)| s.drawn).map(|(i, s)| (i, s.casts))
+    }
+
+    /// All drawables that cast.
+    pub(crate) fn casters(&self, drawables: &[Drawable], revision: impl Fn(u32) -> u64) -> Vec<Caster> {
+        let casting = self.slots.iter().zip(drawables).enumerate().filter(|(_, (s, _))| s.drawn && s.casts);
+        let caster = |(i, (slot, d)): (usize, (&Slot, &Drawable))| Caster {
+            content: [u64::from(slot.mesh) | (i as u64) << 32, u64::from(slot.material), slot.deformed.map_or(0, &revision)],
+            world_from_object: d.world_from_object,
+            centre: d.mesh.bounds.centre(),
+            reach: d.mesh.bounds.radius(),
+        };
+        casting.map(caster).collect()
     }
 
     /// Mesh of a drawn drawable, and its place in the list of deformed ones.

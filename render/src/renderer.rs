@@ -18,7 +18,7 @@ use crate::targets::{Target, ViewTargets};
 use crate::volumes::{VolumeJob, VolumePass};
 use crate::{Error, Gpu, buffer::GrowBuffer, gpu, jobs, surroundings, uniforms};
 use std::time::Instant;
-use umbriel_scene::{Material, Mesh, Picture, Scene};
+use umbriel_scene::{Material, Mesh, Picture, Scene, ShadowMethod};
 
 /// Draws frames.
 pub struct Renderer {
@@ -139,7 +139,10 @@ impl Renderer {
     fn choose_maps(&mut self, scene: &Scene, pictures: &[Picture]) {
         let around = surroundings::of(scene, pictures, &self.draws);
         let problems = &mut self.problems;
-        let is_new = self.maps.choose(&self.gpu.device, scene, &around, |message| problems.report(message));
+        let revision = |d| self.deformer.get(d).map_or(0, |d| d.revision);
+        let has_maps = scene.lights.iter().any(|l| l.shadows == ShadowMethod::Map);
+        let casters = if has_maps { self.draws.casters(&scene.drawables, revision) } else { Vec::new() };
+        let is_new = self.maps.choose(&self.gpu.device, scene, &around, casters, |message| problems.report(message));
         if is_new {
             self.lighting.forget_maps();
         }

@@ -1,6 +1,6 @@
 //! Maps of a directional light: nested boxes fitted once to all views of the frame.
 
-use super::fit::{MARGIN_TEXELS, Projection, light_from_world, parallel};
+use super::fit::{Fit, MARGIN_TEXELS, Projection, light_from_world, parallel};
 use glam::{Mat4, Vec3};
 use umbriel_scene::{Aabb, Light};
 
@@ -15,7 +15,7 @@ pub(crate) struct Eye {
 }
 
 /// The maps of a directional light, the finest first. `receivers` and `casters` are boxes in the world.
-pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, casters: Aabb) -> Vec<Projection> {
+pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, casters: Aabb) -> Vec<Fit> {
     let direction = light.direction.normalize_or(Vec3::NEG_Z);
     let light_from_world = light_from_world(direction);
     let make = |window: [f32; 4], near: f32, far: f32, origin: Vec3| {
@@ -34,11 +34,12 @@ pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, 
     if let Some(window) = light.map.frustum.filter(|[l, r, b, t]| r > l && t > b) {
         let at = light_from_world.transform_point3(light.position).z;
         let [near, far] = light.map.near_far.filter(|[n, f]| f > n).unwrap_or([near + at, far + at]);
-        return vec![make(window, near, far, light.position)];
+        return vec![Fit { projection: make(window, near, far, light.position), needed: None }];
     }
     // A flat floor is a box without height; rounding must not make it vanish.
     let receivers = Aabb { min: receivers.min - slack, max: receivers.max + slack };
-    let mut found: Vec<Projection> = Vec::new();
+    let mut found: Vec<Fit> = Vec::new();
+    let world_from_light = light_from_world.transpose();
     for (from, to) in slices(eyes) {
         let mut seen = Aabb::EMPTY;
         for eye in eyes {
@@ -52,8 +53,10 @@ pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, 
         }
         let (x, y) = (snapped(min.x, max.x, size), snapped(min.y, max.y, size));
         let projection = make([x.0, x.1, y.0, y.1], near, far, Vec3::ZERO);
-        if found.last() != Some(&projection) {
-            found.push(projection);
+        let needed = Aabb { min: min.extend(all.min.z), max: max.extend(all.max.z) };
+        let needed = Some(needed.corners().map(|c| world_from_light.transform_point3(c)));
+        if found.last().is_none_or(|f| f.projection != projection) {
+            found.push(Fit { projection, needed });
         }
     }
     found

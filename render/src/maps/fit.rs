@@ -20,6 +20,13 @@ pub(crate) struct Projection {
     pub(crate) texel: f32,
 }
 
+/// A map, and the corners of what it has to show; without corners it shows all that its light reaches.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Fit {
+    pub(crate) projection: Projection,
+    pub(crate) needed: Option<[Vec3; 8]>,
+}
+
 /// Rotation into the frame of a light that travels along `direction` = -z.
 pub(crate) fn light_from_world(direction: Vec3) -> Mat4 {
     let z = -direction;
@@ -60,7 +67,7 @@ fn usable(settings: &MapSettings) -> (Option<[f32; 4]>, f32, Option<f32>) {
 }
 
 /// The map of a spot light, or six where its cone is too wide for one.
-pub(crate) fn spot(light: &Light, size: u32) -> Vec<Projection> {
+pub(crate) fn spot(light: &Light, size: u32) -> Vec<Fit> {
     let LightKind::Spot { outer_rad, .. } = light.kind else { return point(light, size) };
     if outer_rad > WIDEST_CONE_RAD {
         return point(light, size);
@@ -70,18 +77,20 @@ pub(crate) fn spot(light: &Light, size: u32) -> Vec<Projection> {
     let [l, r, b, t] = window.unwrap_or([-edge, edge, -edge, edge]);
     let view = light_from_world(light.direction.normalize_or(Vec3::NEG_Z)) * Mat4::from_translation(-light.position);
     let map_from_world = perspective([l, r, b, t], near, far) * view;
-    vec![Projection { map_from_world, eye: light.position.extend(1.0), texel: (r - l).max(t - b) / size as f32 }]
+    let texel = (r - l).max(t - b) / size as f32;
+    vec![Fit { projection: Projection { map_from_world, eye: light.position.extend(1.0), texel }, needed: None }]
 }
 
 /// The six maps of a point light: +x -x +y -y +z -z. Each is a little wider than a right angle, for seams.
-pub(crate) fn point(light: &Light, size: u32) -> Vec<Projection> {
+pub(crate) fn point(light: &Light, size: u32) -> Vec<Fit> {
     let (_, near, far) = usable(&light.map);
     let edge = 1.0 + 2.0 * MARGIN_TEXELS / size as f32;
     let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
     axes.map(|axis| {
         let view = light_from_world(axis) * Mat4::from_translation(-light.position);
         let map_from_world = perspective([-edge, edge, -edge, edge], near, far) * view;
-        Projection { map_from_world, eye: light.position.extend(1.0), texel: 2.0 * edge / size as f32 }
+        let texel = 2.0 * edge / size as f32;
+        Fit { projection: Projection { map_from_world, eye: light.position.extend(1.0), texel }, needed: None }
     })
     .to_vec()
 }

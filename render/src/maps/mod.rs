@@ -3,9 +3,10 @@
 mod atlas;
 mod cascades;
 mod fit;
+mod keep;
 
 use crate::cache::VERTEX_BUFFERS;
-use crate::draws::{Alpha, Draw, Draws, Kind};
+use crate::draws::{Alpha, Caster, Draw, Draws, Kind};
 use crate::layouts::Layouts;
 use crate::lights::shines;
 use crate::slots::Slots;
@@ -13,8 +14,10 @@ use crate::uniforms;
 use crate::{cull::Planes, shaders};
 pub(crate) use cascades::Eye;
 use fit::Projection;
+use keep::{Record, Snapshot};
 use std::collections::HashMap;
-use umbriel_scene::{Aabb, Light, LightKind, Scene, ShadowMethod};
+use std::sync::Arc;
+use umbriel_scene::{Aabb, LightKind, Scene, ShadowMethod};
 
 const MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Texture memory for all maps; beyond it sizes are halved, with a report.
@@ -28,11 +31,14 @@ pub(crate) struct Face {
     place: atlas::Place,
     slot: usize,
     draws: Vec<Draw>,
+    /// Has to be drawn in this frame.
+    is_stale: bool,
 }
 
 /// The maps of the frame, and what draws them.
 pub(crate) struct Maps {
     pub(crate) faces: Vec<Face>,
+    records: Vec<Record>,
     pub(crate) whole: wgpu::TextureView,
     pub(crate) texture: wgpu::Texture,
     layers: Vec<wgpu::TextureView>,
@@ -65,7 +71,18 @@ impl Maps {
         let always = Some(wgpu::CompareFunction::Always);
         let no_groups = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor::default());
         let empty = pipeline(device, &module, &no_groups, "empty", None, wgpu::PrimitiveTopology::TriangleList, always, &[]);
-        Maps { faces: Vec::new(), whole, texture, layers, sampler, module, layout, pipelines: HashMap::new(), empty }
+        Maps {
+            faces: Vec::new(),
+            records: Vec::new(),
+            whole,
+            texture,
+            layers,
+            sampler,
+            module,
+            layout,
+            pipelines: HashMap::new(),
+            empty,
+        }
     }
 
     /// Chooses the maps of the frame. True where the texture is a
@@ -75,51 +92,90 @@ impl Maps {
         device: &wgpu::Device,
         scene: &Scene,
         around: &Surroundings,
+        casters: Vec<Caster>,
         mut report: impl FnMut(String),
     ) -> bool {
         self.faces.clear();
         let limit = device.limits().max_texture_dimension_2d;
-        let mapped = |l: &Light| l.shadows == ShadowMethod::Map && shines(l);
-        for (index, light) in scene.lights.iter().enumerate().filter(|(_, l)| mapped(l)) {
+        let mapped: Vec<usize> = (0..scene.lights.len())
+            .filter(|i| scene.lights[*i].shadows == ShadowMethod::Map && shines(&scene.lights[*i]))
+            .collect();
+        if mapped.is_empty() {
+            self.records.clear();
+            return false;
+        }
+        let mut lights = Vec::new();
+        for &index in &mapped {
+            let light = &scene.lights[index];
             let size = light.map.size.clamp(1, limit);
             if size != light.map.size {
                 report(format!("light '{}': shadow map size {}: using {size}", light.name, light.map.size));
             }
-            let projections = match light.kind {
+            let fits = match light.kind {
                 LightKind::Directional => cascades::cascades(light, size, &around.eyes, around.receivers, around.casters),
                 LightKind::Spot { .. } => fit::spot(light, size),
                 LightKind::Point => fit::point(light, size),
             };
-            for projection in projections {
-                self.faces.push(Face { light: index, projection, size, place: [0; 3], slot: 0, draws: Vec::new() });
-            }
+            lights.push((index, size, fits));
         }
+        let sides: Vec<u32> = lights.iter().flat_map(|(_, size, fits)| fits.iter().map(|_| *size)).collect();
+        let (sides, is_new) = self.make_room(device, sides, report);
+        let (_, _, places) = atlas::pack(&sides);
+        let snapshot = Arc::new(Snapshot { casters, radius: around.casters.radius() });
+        let old = std::mem::take(&mut self.records);
+        let mut tiles = sides.into_iter().zip(places);
+        for (number, (index, size, wanted)) in lights.into_iter().enumerate() {
+            let light = &scene.lights[index];
+            let tiles: Vec<(u32, atlas::Place)> = tiles.by_ref().take(wanted.len()).collect();
+            let record = old.get(number).filter(|r| !is_new && r.tiles == tiles);
+            let kept = record.and_then(|r| {
+                let new_from_old = keep::motion(&r.snapshot, &snapshot)?;
+                r.kept(light, &wanted, new_from_old)
+            });
+            let is_stale = kept.is_none();
+            let fits = kept.unwrap_or(wanted);
+            for (fit, (tile, place)) in fits.iter().zip(&tiles) {
+                let mut projection = fit.projection;
+                projection.texel *= size as f32 / *tile as f32;
+                let draws = Vec::new();
+                self.faces.push(Face { light: index, projection, size: *tile, place: *place, slot: 0, draws, is_stale });
+            }
+            // A kept map stays as old as it is: deviations do not add up.
+            self.records.push(match record.filter(|_| !is_stale) {
+                Some(r) => Record { light: r.light.clone(), snapshot: r.snapshot.clone(), fits: r.fits.clone(), tiles },
+                None => Record { light: light.clone(), snapshot: snapshot.clone(), fits, tiles },
+            });
+        }
+        is_new
+    }
+
+    /// Makes the texture as large as squares of these sides need. Gives the sides that memory allows, and whether the
+    /// texture is a new one.
+    fn make_room(&mut self, device: &wgpu::Device, mut sides: Vec<u32>, mut report: impl FnMut(String)) -> (Vec<u32>, bool) {
         let bytes = |sides: &[u32]| {
             let (side, layers, _) = atlas::pack(sides);
             4 * u64::from(side) * u64::from(side) * u64::from(layers)
         };
-        let mut sides: Vec<u32> = self.faces.iter().map(|f| f.size).collect();
         while bytes(&sides) > MEMORY_BYTES {
             sides.iter_mut().for_each(|s| *s = (*s / 2).max(1));
             report(format!("shadow maps need more than {} MiB: halving their sizes", MEMORY_BYTES >> 20));
         }
-        let (side, layers, places) = atlas::pack(&sides);
-        for ((face, size), place) in self.faces.iter_mut().zip(sides).zip(places) {
-            face.projection.texel *= face.size as f32 / size as f32;
-            (face.size, face.place) = (size, place);
-        }
+        let (side, layers, _) = atlas::pack(&sides);
         let now = self.texture.size();
-        if (now.width, now.depth_or_array_layers) == (side, layers.max(2)) {
-            return false;
+        let is_new = (now.width, now.depth_or_array_layers) != (side, layers.max(2));
+        if is_new {
+            (self.texture, self.whole, self.layers) = make_texture(device, side, layers);
         }
-        (self.texture, self.whole, self.layers) = make_texture(device, side, layers);
-        true
+        (sides, is_new)
     }
 
     /// Finds the casters of every map and the pipelines that they need.
     pub(crate) fn prepare(&mut self, device: &wgpu::Device, slots: &mut Slots<uniforms::View>, draws: &mut Draws) {
         for face in &mut self.faces {
             let map_from_world = face.projection.map_from_world;
+            if !face.is_stale {
+                continue;
+            }
             face.slot = slots.push(&view_of(&face.projection));
             let planes = Planes::new(&map_from_world);
             face.draws = draws.cull(&planes, |_, casts, _| casts).0;
@@ -158,7 +214,7 @@ impl Maps {
     ) -> u32 {
         let mut redrawn = 0;
         for (layer, view) in (0u32..).zip(&self.layers) {
-            let faces: Vec<&Face> = self.faces.iter().filter(|f| f.place[2] == layer).collect();
+            let faces: Vec<&Face> = self.faces.iter().filter(|f| f.is_stale && f.place[2] == layer).collect();
             if faces.is_empty() {
                 continue;
             }

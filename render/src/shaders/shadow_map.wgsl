@@ -25,7 +25,7 @@ fn map_visibility(light: Light, p_in_world: vec3<f32>, face_normal: vec3<f32>) -
     var face_index = light.first_face;
     var found = false;
     if light.face_count == 6u {
-        face_index += major_axis(p_in_world - light.position);
+        face_index += major_axis(map_faces[face_index], p_in_world);
         found = true;
     } else {
         for (var i = 0u; i < light.face_count; i++) {
@@ -42,8 +42,12 @@ fn map_visibility(light: Light, p_in_world: vec3<f32>, face_normal: vec3<f32>) -
     return face_visibility(light, map_faces[face_index], p_in_world, face_normal);
 }
 
-// +x -x +y -y +z -z
-fn major_axis(d: vec3<f32>) -> u32 {
+// +x -x +y -y +z -z of the map's own axes, which may have turned since: the first face looks along +x, +z at its
+// right and +y above.
+fn major_axis(first: MapFace, p_in_world: vec3<f32>) -> u32 {
+    let clip = first.map_from_world * vec4<f32>(p_in_world, 1.0);
+    let edge = 0.5 * first.texel * f32(first.tile.z);
+    let d = vec3<f32>(clip.w, clip.y * edge, clip.x * edge);
     let a = abs(d);
     if a.x >= a.y && a.x >= a.z {
         return select(0u, 1u, d.x < 0.0);
