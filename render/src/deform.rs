@@ -1,6 +1,7 @@
 //! Skins and morph targets: once per frame, into vertices that all passes share.
 
 use crate::cache::GpuMesh;
+use crate::clock::Clock;
 use crate::shaders;
 use bytemuck::{Pod, Zeroable};
 use std::collections::HashMap;
@@ -162,11 +163,13 @@ impl Deformer {
     }
 
     /// Computes what was taken since the last call; the number of meshes.
-    pub(crate) fn run(&mut self, encoder: &mut wgpu::CommandEncoder) -> u32 {
+    pub(crate) fn run(&mut self, encoder: &mut wgpu::CommandEncoder, clock: &Clock) -> u32 {
         let count = self.jobs.len() as u32;
         if count > 0 {
-            let mut pass =
-                encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("deform"), timestamp_writes: None });
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("deform"),
+                timestamp_writes: clock.compute("deform"),
+            });
             pass.set_pipeline(&self.pipeline);
             for (group, vertices) in self.jobs.drain(..) {
                 let groups = vertices.div_ceil(WORKGROUP);

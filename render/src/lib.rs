@@ -8,6 +8,7 @@
 
 mod buffer;
 mod cache;
+mod clock;
 mod cull;
 mod deform;
 mod draws;
@@ -34,6 +35,6 @@ pub mod volumes;
 
 pub use error::Error;
 pub use gpu::Gpu;
-pub use read_back::RgbaPixels;
+pub use read_back::{GreyPixels, RgbaPixels};
 pub use renderer::Renderer;
 pub use stats::FrameStats;

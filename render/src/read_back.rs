@@ -22,6 +22,17 @@ impl RgbaPixels {
     }
 }
 
+/// A grey picture in memory: rows from the top, one byte per pixel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GreyPixels {
+    /// Across.
+    pub width: u32,
+    /// Down.
+    pub height: u32,
+    /// One byte per pixel.
+    pub grey: Vec<u8>,
+}
+
 /// Bytes of one layer of a texture of four bytes per texel.
 pub(crate) fn layer(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture, layer: u32) -> Result<Vec<u8>, Error> {
     let size = texture.size();

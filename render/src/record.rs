@@ -1,6 +1,7 @@
 //! Recording of passes.
 
 use crate::cache::{GpuMaterial, GpuMesh, Slab};
+use crate::clock::Clock;
 use crate::deform::Deformer;
 use crate::draws::{Batch, Draw, Kind};
 use crate::maps::Maps;
@@ -78,6 +79,7 @@ pub(crate) struct Recorder<'a> {
     pub(crate) views: &'a Slots<uniforms::View>,
     pub(crate) films: &'a Slots<uniforms::Film>,
     pub(crate) lighting: Option<&'a wgpu::BindGroup>,
+    pub(crate) clock: &'a Clock,
     pub(crate) stats: &'a mut FrameStats,
 }
 
@@ -85,7 +87,7 @@ impl Recorder<'_> {
     /// All shadow maps of the frame.
     pub(crate) fn maps(&mut self, encoder: &mut wgpu::CommandEncoder, maps: &Maps) {
         let (drawer, views) = (self.drawer, self.views);
-        self.stats.map_redraws = maps.draw(encoder, views, |pass, draws| {
+        self.stats.map_redraws = maps.draw(encoder, self.clock, views, |pass, draws| {
             drawer.draw(pass, draws, self.stats, |pass, kind| maps.set_pipeline(pass, &kind));
         });
     }
@@ -93,7 +95,7 @@ impl Recorder<'_> {
     /// One view: surfaces, then light and films by shadow volumes, then what is half-transparent.
     pub(crate) fn view(&mut self, encoder: &mut wgpu::CommandEncoder, view: &ViewPlan, to: &ViewTarget) {
         let is_last = view.steps.is_empty();
-        let mut pass = begin_view(encoder, "surfaces", to, true, is_last);
+        let mut pass = begin_view(encoder, self.clock, "surfaces", to, true, is_last);
         pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
         self.surfaces(&mut pass, &view.opaque, view.base_pass());
         if !view.is_visibility {
@@ -106,7 +108,7 @@ impl Recorder<'_> {
                 break;
             }
             drop(pass);
-            pass = begin_view(encoder, "shadow volumes", to, false, number + 1 == view.steps.len());
+            pass = begin_view(encoder, self.clock, "shadow volumes", to, false, number + 1 == view.steps.len());
             self.volumes.draw(&mut pass, step.job, self.views.group(view.base_slot));
             pass.set_stencil_reference(0);
             match step.then {
@@ -145,7 +147,7 @@ impl Recorder<'_> {
     ) {
         let (target, pipelines) =
             if view.is_visibility { (&to.plain, &self.screen.plain) } else { (&to.encoding, &self.screen.exposed) };
-        let mut pass = begin_colour(encoder, "compose", target, is_first);
+        let mut pass = begin_colour(encoder, self.clock.render("compose"), target, is_first);
         let r = view.rect;
         pass.set_viewport(r.x as f32, r.y as f32, r.width as f32, r.height as f32, 0.0, 1.0);
         pass.set_pipeline(&pipelines[view.channels]);
@@ -158,13 +160,14 @@ impl Recorder<'_> {
 /// A pass into one texture, black at first.
 pub(crate) fn begin_colour<'e>(
     encoder: &'e mut wgpu::CommandEncoder,
-    label: &str,
+    timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
     view: &wgpu::TextureView,
     is_first: bool,
 ) -> wgpu::RenderPass<'e> {
     let load = if is_first { LoadOp::Clear(wgpu::Color::BLACK) } else { LoadOp::Load };
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some(label),
+        label: Some("compose"),
+        timestamp_writes,
         color_attachments: &[Some(wgpu::RenderPassColorAttachment {
             view,
             depth_slice: None,
@@ -178,7 +181,8 @@ pub(crate) fn begin_colour<'e>(
 /// A pass into a view. The first fills depth, later ones read it and start with an empty stencil; the last resolves.
 fn begin_view<'e>(
     encoder: &'e mut wgpu::CommandEncoder,
-    label: &str,
+    clock: &Clock,
+    label: &'static str,
     to: &ViewTarget,
     is_first: bool,
     is_last: bool,
@@ -187,6 +191,7 @@ fn begin_view<'e>(
     let load = if is_first { LoadOp::Clear(wgpu::Color::BLACK) } else { LoadOp::Load };
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some(label),
+        timestamp_writes: clock.render(label),
         color_attachments: &[Some(wgpu::RenderPassColorAttachment {
             view: &to.samples,
             depth_slice: None,

@@ -1,6 +1,7 @@
 //! The frame: what is prepared, sent and recorded, from top to bottom.
 
 use crate::cache::{GpuMaterial, GpuMesh, MaterialCache, Slab, make_mesh};
+use crate::clock::Clock;
 use crate::deform::Deformer;
 use crate::draws::{Caches, Draws};
 use crate::layouts::Layouts;
@@ -8,7 +9,7 @@ use crate::lighting::Lighting;
 use crate::lights::Lights;
 use crate::maps::Maps;
 use crate::plan::{self, Purpose, ViewPlan};
-use crate::read_back::{self, RgbaPixels};
+use crate::read_back::{self, GreyPixels, RgbaPixels};
 use crate::record::{Drawer, Recorder};
 use crate::screen::Screen;
 use crate::slots::Slots;
@@ -40,6 +41,7 @@ pub struct Renderer {
     view_targets: ViewTargets,
     targets: Vec<Option<Target>>,
     problems: Problems,
+    clock: Clock,
     frame: u64,
 }
 
@@ -66,6 +68,7 @@ impl Renderer {
             view_targets: ViewTargets::default(),
             targets: Vec::new(),
             problems: Problems::default(),
+            clock: Clock::new(device, &gpu.queue),
             frame: 0,
             layouts,
             gpu: gpu.clone(),
@@ -199,7 +202,7 @@ impl Renderer {
     fn record(&mut self, plans: &[ViewPlan], jobs: &[VolumeJob], stats: &mut FrameStats) {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
-        stats.deformed = self.deformer.run(&mut encoder);
+        stats.deformed = self.deformer.run(&mut encoder, &self.clock);
         self.volumes.prepare(device, &mut encoder, jobs);
         let drawer = Drawer {
             meshes: &self.meshes,
@@ -217,6 +220,7 @@ impl Renderer {
             views: &self.views,
             films: &self.films,
             lighting: self.lighting.group(),
+            clock: &self.clock,
             stats,
         };
         recorder.maps(&mut encoder, &self.maps);
@@ -228,7 +232,9 @@ impl Renderer {
                 recorder.compose(&mut encoder, view, from, &to.layers[view.layer], is_first);
             }
         }
+        self.clock.resolve(&mut encoder);
         queue.submit([encoder.finish()]);
+        stats.gpu_s = self.clock.collect(device);
     }
 
     fn drop_unused(&mut self) {
@@ -267,6 +273,13 @@ impl Renderer {
             .collect()
     }
 
+    /// The shadow maps of a light of the last frame's scene as grey pictures: the nearest surface is white, the farthest
+    /// dark grey, nothing black. One for a spot light, one per cascade, six for a point light (+x -x +y -y +z -z).
+    pub fn shadow_map_picture(&self, light: usize) -> Result<Vec<GreyPixels>, Error> {
+        let pictures = self.maps.pictures(&self.gpu.device, &self.gpu.queue, light)?;
+        if pictures.is_empty() { Err(Error::NoMap(light)) } else { Ok(pictures) }
+    }
+
     /// Shows the first layer of a picture on the whole of a window's surface of the given format.
     pub fn blit(
         &mut self,
@@ -279,7 +292,7 @@ impl Renderer {
         let layer = &self.finished(picture)?.layers[0];
         // A surface that encodes gets linear values, any other gets the bytes.
         let group = if format.is_srgb() { &layer.group_decoding } else { &layer.group };
-        let mut pass = crate::record::begin_colour(encoder, "blit", surface, true);
+        let mut pass = crate::record::begin_colour(encoder, None, surface, true);
         pass.set_pipeline(&pipeline);
         pass.set_bind_group(0, self.views.group(0), &[]);
         pass.set_bind_group(1, group, &[]);

@@ -4,8 +4,10 @@ mod atlas;
 mod cascades;
 mod fit;
 mod keep;
+mod picture;
 
 use crate::cache::VERTEX_BUFFERS;
+use crate::clock::Clock;
 use crate::draws::{Alpha, Caster, Draw, Draws, Kind};
 use crate::layouts::Layouts;
 use crate::lights::shines;
@@ -209,6 +211,7 @@ impl Maps {
     pub(crate) fn draw(
         &self,
         encoder: &mut wgpu::CommandEncoder,
+        clock: &Clock,
         slots: &Slots<uniforms::View>,
         mut draw: impl FnMut(&mut wgpu::RenderPass<'_>, &[Draw]),
     ) -> u32 {
@@ -220,6 +223,7 @@ impl Maps {
             }
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("shadow maps"),
+                timestamp_writes: clock.render("shadow maps"),
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                     view,
                     depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store }),

@@ -1,8 +1,11 @@
 //! Pictures of scenes made in code, compared with numbers that follow from the scene.
 
+mod deformation;
 mod layouts;
 mod lights;
+mod outputs;
 mod shadows;
 mod shapes;
 mod support;
+mod surfaces;
 mod town;
