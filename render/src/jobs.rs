@@ -54,12 +54,12 @@ pub(crate) fn jobs(
 }
 
 fn volume_light(light: &Light) -> VolumeLight {
-    let toward_light = match light.kind {
+    let toward_light: Vec4 = match light.kind {
         LightKind::Directional => -light.direction.normalize_or(Vec3::NEG_Z).extend(0.0),
         _ => light.position.extend(1.0),
     };
     let range = if toward_light.w == 0.0 { f32::INFINITY } else { light.range };
-    VolumeLight { toward_light: Vec4::from(toward_light), range }
+    VolumeLight { toward_light, range }
 }
 
 fn caster(
