@@ -17,7 +17,7 @@ use crate::limits::Limits;
 use crate::property_names::PropertyNames;
 use crate::reference::FunctionDoc;
 use crate::source::Source;
-use crate::stage::{Node, Stage};
+use crate::stage::{Handler, Node, Stage};
 use crate::words;
 
 /// Stack for scripts: nesting of values is bounded by what fits onto it, see `weigh`. Only what is touched is used.
@@ -52,6 +52,7 @@ impl Script {
         set_limits(&mut engine, &stage.limits);
         set_hooks(&mut engine, &stage, &property_names, &constants);
         set_constants(&mut engine, world);
+        name_faults(&mut engine);
         let docs = words::teach(&mut engine, &stage);
         Self { engine, stage, property_names, constants, docs, ast: AST::empty(), scope: Scope::new() }
     }
@@ -79,7 +80,11 @@ impl Script {
         let result = self.evaluate(&ast);
         self.ast = ast;
         let value = result?;
-        Ok(if value.is_unit() { String::new() } else { value.to_string() })
+        if value.is_unit() {
+            return Ok(String::new());
+        }
+        let text = || self.engine.eval_fn_call::<Dynamic>("to_string", None, (value,));
+        self.guarded(self.stage.limits.handler, text).map(|text| text.to_string()).map_err(|error| self.problem(&error))
     }
 
     fn compile(&self, text: &str) -> Result<AST, Box<EvalAltResult>> {
@@ -95,13 +100,21 @@ impl Script {
         let constants = scope.iter_raw().filter(|(_, constant, _)| *constant);
         *self.constants.borrow_mut() = constants.map(|(name, _, value)| (name.to_string(), value.flatten_clone())).collect();
         self.scope = scope;
-        result
+        result.map_err(|error| self.problem(&error))
     }
 
-    /// Calls a function of the script, with as many of the values as it takes.
-    pub(crate) fn call(&self, function: &FnPtr, mut values: Vec<Dynamic>) -> Result<Dynamic, Problem> {
-        values.truncate(self.parameters(function).unwrap_or(values.len()));
-        self.guarded(self.stage.limits.handler, || function.call::<Dynamic>(&self.engine, &self.ast, values))
+    /// Calls a function of the script, with as many of the values as it takes. A problem that knows no place of its own
+    /// gets that of the handler.
+    pub(crate) fn call(&self, handler: &Handler, mut values: Vec<Dynamic>) -> Result<Dynamic, Problem> {
+        values.truncate(self.parameters(&handler.call).unwrap_or(values.len()));
+        let call = || handler.call.call::<Dynamic>(&self.engine, &self.ast, values);
+        self.guarded(self.stage.limits.handler, call).map_err(|error| {
+            let mut problem = self.problem(&error);
+            if problem.line == 0 {
+                (problem.file, problem.line, problem.column) = self.stage.source.borrow().place(handler.place);
+            }
+            problem
+        })
     }
 
     /// How many values a function takes beside those that it captured; the most, if there are several of its name.
@@ -111,12 +124,12 @@ impl Script {
     }
 
     /// Runs script code against the clock; a panic of the engine is a problem like any other.
-    fn guarded(&self, time: Duration, run: impl FnOnce() -> Outcome<Dynamic>) -> Result<Dynamic, Problem> {
+    fn guarded(&self, time: Duration, run: impl FnOnce() -> Outcome<Dynamic>) -> Outcome<Dynamic> {
         let result = catch_unwind(AssertUnwindSafe(|| self.stage.meter.within(time, run)));
         let result = result.unwrap_or_else(|panic| Err(broken(panic.as_ref())));
         match result {
             Err(error) if matches!(*error, EvalAltResult::Exit(..)) => Ok(Dynamic::UNIT),
-            result => result.map_err(|error| self.problem(&error)),
+            result => result,
         }
     }
 
@@ -199,6 +212,18 @@ fn set_hooks(engine: &mut Engine, stage: &Rc<Stage>, property_names: &Rc<Propert
         let running = context.global_runtime_state().constants.as_ref().and_then(|c| c.borrow().get(name).cloned());
         Ok(running.or_else(|| constants.borrow().get(name).cloned()))
     });
+}
+
+/// What a `catch` gets: `error.message`, `error.node`, `error.field`.
+fn name_faults(engine: &mut Engine) {
+    let text = |text: &Option<String>| text.clone().map_or(Dynamic::UNIT, Dynamic::from);
+    engine
+        .register_type_with_name::<Fault>("Fault")
+        .register_get("message", |fault: &mut Fault| fault.message.clone())
+        .register_get("node", move |fault: &mut Fault| text(&fault.node))
+        .register_get("field", move |fault: &mut Fault| text(&fault.field))
+        .register_fn("to_string", |fault: &mut Fault| fault.message.clone())
+        .register_fn("to_debug", |fault: &mut Fault| fault.message.clone());
 }
 
 fn set_constants(engine: &mut Engine, world: Option<Node>) {

@@ -103,6 +103,10 @@ impl Meter {
         if !operations.is_multiple_of(CLOCK_EVERY) {
             return None;
         }
+        self.expired()
+    }
+
+    fn expired(&self) -> Option<String> {
         let (end, time) = self.deadline.get()?;
         (Instant::now() > end).then(|| format!("ran longer than {} ms", time.as_millis()))
     }

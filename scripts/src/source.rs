@@ -91,9 +91,20 @@ impl Source {
     pub(crate) fn place(&self, position: Position) -> (String, usize, usize) {
         let place = position.line().and_then(|line| self.lines.get(line.saturating_sub(1)));
         match place {
-            Some((file, line)) => (self.names[*file].clone(), *line, position.position().unwrap_or(0)),
+            Some((file, line)) => (self.names[*file].clone(), *line, self.name_after_dot(position)),
             None => (self.names.first().cloned().unwrap_or_default(), 0, 0),
         }
+    }
+}
+
+impl Source {
+    /// The column; that of the name where rhai tells that of the dot before it.
+    fn name_after_dot(&self, position: Position) -> usize {
+        let column = position.position().unwrap_or(0);
+        let line = self.text.lines().nth(position.line().unwrap_or(0).saturating_sub(1)).unwrap_or("");
+        let mut from_there = line.chars().skip(column.saturating_sub(1));
+        let before_name = from_there.next() == Some('.') && from_there.next().is_some_and(char::is_alphabetic);
+        column + usize::from(before_name)
     }
 }
 

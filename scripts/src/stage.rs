@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use rhai::{Dynamic, FnPtr};
+use rhai::{Dynamic, FnPtr, Position};
 use umbriel_fields::{EnumValue, Error, FieldId, FieldType, Graph, Kind, NodeId, ObserverId, Value};
 
 use crate::error::{Fault, Outcome, Problem, fail};
@@ -17,10 +17,17 @@ use crate::values::{natural, to_dynamic, to_value};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Node(pub(crate) NodeId);
 
-/// A function to be called when a field changes; `me` goes first where a node type declared it.
+/// A function of the script that is called later, and where the script said so.
+#[derive(Clone)]
+pub(crate) struct Handler {
+    pub(crate) call: FnPtr,
+    pub(crate) place: Position,
+}
+
+/// A handler of a field; `me` goes first where a node type declared it.
 #[derive(Clone)]
 pub(crate) struct OnChange {
-    pub(crate) call: FnPtr,
+    pub(crate) handler: Handler,
     pub(crate) field: FieldId,
     pub(crate) observer: ObserverId,
     pub(crate) me: Option<Node>,
@@ -29,8 +36,8 @@ pub(crate) struct OnChange {
 /// A node type that a script defined.
 #[derive(Clone, Default)]
 pub(crate) struct Definition {
-    pub(crate) evaluate: Option<FnPtr>,
-    pub(crate) changed: Vec<(String, FnPtr)>,
+    pub(crate) evaluate: Option<Handler>,
+    pub(crate) changed: Vec<(String, Handler)>,
 }
 
 /// The name of an enum's value.
@@ -51,7 +58,7 @@ pub(crate) struct Stage {
     pub(crate) source: RefCell<Rc<Source>>,
     /// Files that the script read, beside its own text.
     pub(crate) files: RefCell<BTreeSet<PathBuf>>,
-    pub(crate) on_frame: RefCell<BTreeMap<u64, FnPtr>>,
+    pub(crate) on_frame: RefCell<BTreeMap<u64, Handler>>,
     pub(crate) on_change: RefCell<BTreeMap<u64, OnChange>>,
     pub(crate) definitions: RefCell<HashMap<String, Definition>>,
     /// Nodes of script-defined types whose evaluate failed.
@@ -107,8 +114,8 @@ impl Stage {
         let id = self.write(|graph| graph.create(type_name)).map_err(|e| Fault::new(e.to_string()))?;
         let canonical = self.read(|graph| graph.type_of(id).name.to_string());
         let changed = self.definitions.borrow().get(&canonical).map(|d| d.changed.clone()).unwrap_or_default();
-        for (field, call) in changed {
-            self.observe(Node(id), &field, call, Some(Node(id)))?;
+        for (field, handler) in changed {
+            self.observe(Node(id), &field, handler, Some(Node(id)))?;
         }
         Ok(Node(id))
     }
@@ -153,7 +160,7 @@ impl Stage {
     pub(crate) fn value(&self, field: FieldId) -> Dynamic {
         self.read(|graph| {
             let Ok(value) = graph.value(field) else { return Dynamic::UNIT };
-            to_dynamic(&value, |choice| choice_name(graph, field, choice))
+            to_dynamic(&value, &|choice| choice_name(graph, field, choice))
         })
     }
 
@@ -211,11 +218,11 @@ impl Stage {
         Ok(self.next_handler.get())
     }
 
-    pub(crate) fn observe(&self, node: Node, field: &str, call: FnPtr, me: Option<Node>) -> Outcome<u64> {
+    pub(crate) fn observe(&self, node: Node, field: &str, handler: Handler, me: Option<Node>) -> Outcome<u64> {
         let field = self.field(node, field)?;
         let id = self.handler_id()?;
         let observer = self.write(|graph| graph.observe(field, id)).map_err(|e| self.fault(e, &self.label(node), None))?;
-        self.on_change.borrow_mut().insert(id, OnChange { call, field, observer, me });
+        self.on_change.borrow_mut().insert(id, OnChange { handler, field, observer, me });
         Ok(id)
     }
 

@@ -150,7 +150,7 @@ pub(crate) fn parse_hex(text: &str) -> Option<Vec3> {
 }
 
 /// The value of a field as a script sees it; `choice` names the value of an enum.
-pub(crate) fn to_dynamic(value: &Value, choice: impl Fn(u16) -> String) -> Dynamic {
+pub(crate) fn to_dynamic(value: &Value, choice: &dyn Fn(u16) -> String) -> Dynamic {
     match value {
         Value::Bool(v) => (*v).into(),
         Value::I32(v) => i64::from(*v).into(),
@@ -170,7 +170,7 @@ pub(crate) fn to_dynamic(value: &Value, choice: impl Fn(u16) -> String) -> Dynam
         Value::ColorA(v) => Dynamic::from(*v),
         Value::Node(v) => node_or_unit(*v),
         Value::Image(v) => v.clone().map_or(Dynamic::UNIT, |image| Dynamic::from(Picture(image))),
-        many => (0..many.len()).filter_map(|i| many.element(i)).map(|one| to_dynamic(&one, &choice)).collect::<Array>().into(),
+        many => (0..many.len()).filter_map(|i| many.element(i)).map(|one| to_dynamic(&one, choice)).collect::<Array>().into(),
     }
 }
 

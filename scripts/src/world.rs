@@ -227,7 +227,7 @@ impl Host for Callbacks<'_> {
         stage.with(graph, || {
             let me = handler.me.map(Dynamic::from);
             let values = me.into_iter().chain([stage.value(handler.field)]).collect();
-            if let Err(mut problem) = self.script.call(&handler.call, values) {
+            if let Err(mut problem) = self.script.call(&handler.handler, values) {
                 let node = Node(handler.field.node);
                 problem.node = problem.node.or_else(|| Some(stage.label(node)));
                 switch_off(stage, problem, "this on_change handler is switched off");

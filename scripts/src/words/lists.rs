@@ -15,6 +15,10 @@ pub(super) fn teach(words: &mut Words<'_>) {
             (0..count).map(|i| make.call_within_context::<Dynamic>(&context, (i as i64,))).collect()
         },
     );
+    words.form("sort", |context: NativeCallContext<'_>, array: &mut Array, compare: FnPtr| -> Outcome<()> {
+        *array = sort(&context, array.clone(), &compare)?;
+        Ok(())
+    });
     words.word(
         "grid(columns: int, rows: int, make: |u, v|) -> array",
         "An array of what the function makes of the points of a grid over 0 to 1, row by row.",
@@ -41,6 +45,26 @@ pub(super) fn teach(words: &mut Words<'_>) {
             Ok(index)
         },
     );
+}
+
+/// Merge sort that ends with the first error; rhai's own goes on comparing, which a script out of time must not.
+fn sort(context: &NativeCallContext<'_>, array: Array, compare: &FnPtr) -> Outcome<Array> {
+    if array.len() < 2 {
+        return Ok(array);
+    }
+    let mut left = array;
+    let right = left.split_off(left.len() / 2);
+    let (left, right) = (sort(context, left, compare)?, sort(context, right, compare)?);
+    let mut sorted = Array::with_capacity(left.len() + right.len());
+    let (mut left, mut right) = (left.into_iter().peekable(), right.into_iter().peekable());
+    while let (Some(a), Some(b)) = (left.peek(), right.peek()) {
+        let order = compare.call_within_context::<Dynamic>(context, (a.clone(), b.clone()))?;
+        let right_first = order.as_int().map_or_else(|_| order.as_bool() == Ok(false), |order| order > 0);
+        sorted.extend(if right_first { right.next() } else { left.next() });
+    }
+    sorted.extend(left);
+    sorted.extend(right);
+    Ok(sorted)
 }
 
 fn length(columns: i64, rows: i64, limit: usize) -> Outcome<usize> {

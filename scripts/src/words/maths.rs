@@ -79,7 +79,7 @@ fn random(words: &mut Words<'_>) {
     words.word(
         "int(random: Random, low: int, high: int) -> int",
         "The next whole number from `low` to `high`, both included.",
-        { |r: &mut Random, low: i64, high: i64| r.int(low, high) },
+        |r: &mut Random, low: i64, high: i64| r.int(low, high),
     );
     words.form("to_string", |_: &mut Random| "Random").form("to_debug", |_: &mut Random| "Random");
 }

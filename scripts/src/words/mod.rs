@@ -3,8 +3,10 @@
 mod handlers;
 mod lists;
 mod maths;
+mod models;
 mod nodes;
 mod paper;
+mod rigs;
 mod routes;
 mod shapes;
 mod types;
@@ -62,10 +64,12 @@ pub(crate) fn teach(engine: &mut Engine, stage: &Rc<Stage>) -> Vec<FunctionDoc> 
     routes::teach(words.chapter("Routes"));
     handlers::teach(words.chapter("Handlers"));
     shapes::teach(words.chapter("Shapes and groups"));
+    models::teach(words.chapter("Models"));
     types::teach(words.chapter("Node types of your own"));
     vectors::teach(words.chapter("Vectors, turns, colours"));
     maths::teach(words.chapter("Numbers"));
     lists::teach(words.chapter("Lists"));
+    rigs::teach(words.chapter("Rooms"));
     paper::teach(words.chapter("As in AVANGO's scheme"));
     words.docs
 }

@@ -1,16 +1,20 @@
 //! Nodes: making, finding, reading and writing fields, putting them below each other.
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
 use rhai::{Array, Dynamic, FuncRegistration, ImmutableString, Map};
+use umbriel_fields::{Graph, Kind, NodeId, Value};
 
 use super::Words;
-use crate::error::{Outcome, fail};
+use crate::error::{Fault, Outcome};
 use crate::stage::{Node, Stage};
 use crate::values::{node_or_unit, show};
 
 pub(super) fn teach(words: &mut Words<'_>) {
     make(words);
     fields(words);
-    below(words);
+    groups(words);
     find(words);
 }
 
@@ -123,7 +127,7 @@ fn field_names(stage: &Stage, node: Node) -> Array {
     })
 }
 
-fn below(words: &mut Words<'_>) {
+fn groups(words: &mut Words<'_>) {
     let stage = words.stage.clone();
     words.word(
         "add(group: Node, node: Node)",
@@ -183,13 +187,37 @@ fn find(words: &mut Words<'_>) {
         },
     );
     let stage = words.stage.clone();
+    words.word(
+        "find(below: Node, name: string) -> Node",
+        "The node of this name below another one, or `()`. Finds it in a model that was loaded more than once, too.",
+        move |top: &mut Node, name: &str| -> Dynamic {
+            let is_it = |own: &str| {
+                own == name || own.rsplit_once('.').is_some_and(|(own, copy)| own == name && copy.parse::<u32>().is_ok())
+            };
+            stage.read(|graph| {
+                let found = below(graph, top.0).into_iter().find(|id| graph.name(*id).is_some_and(is_it));
+                node_or_unit(found)
+            })
+        },
+    );
+    let stage = words.stage.clone();
+    words.word(
+        "descendants(below: Node, type: string) -> array",
+        "All nodes of a type that hang below a node, by children and by all other fields.",
+        move |top: &mut Node, name: &str| -> Outcome<Array> {
+            stage.read(|graph| {
+                let wanted = graph.types().get(name).map_err(|e| Fault::new(e.to_string()))?;
+                let mut found = below(graph, top.0);
+                found.retain(|id| graph.type_of(*id).name == wanted.name);
+                Ok(found.into_iter().map(|id| Dynamic::from(Node(id))).collect())
+            })
+        },
+    );
+    let stage = words.stage.clone();
     words.word("find_all(type: string) -> array", "All nodes of a type.", move |name: &str| -> Outcome<Array> {
-        let wanted = match stage.read(|graph| graph.types().get(name)) {
-            Ok(wanted) => wanted,
-            Err(error) => return fail(error.to_string()),
-        };
+        let wanted = stage.read(|graph| graph.types().get(name)).map_err(|e| Fault::new(e.to_string()))?;
         Ok(stage.read(|graph| {
-            let of_type = |id: &umbriel_fields::NodeId| graph.type_of(*id).name == wanted.name;
+            let of_type = |id: &NodeId| graph.type_of(*id).name == wanted.name;
             graph.nodes().filter(of_type).map(|id| Dynamic::from(Node(id))).collect()
         }))
     });
@@ -197,4 +225,23 @@ fn find(words: &mut Words<'_>) {
     words.word("types() -> array", "The names of all node types.", move || -> Array {
         stage.read(|graph| graph.types().iter().map(|node_type| node_type.name.to_string().into()).collect())
     });
+}
+
+/// A node and all that hangs below it, each once, parents before what is below them.
+fn below(graph: &Graph, top: NodeId) -> Vec<NodeId> {
+    let mut found = vec![top];
+    let mut seen = HashSet::from([top]);
+    let mut next = 0;
+    while let Some(id) = found.get(next).copied() {
+        next += 1;
+        for (field, _) in graph.field_ids(id).filter(|(_, declared)| declared.field_type.kind == Kind::Node) {
+            let nodes = match graph.value(field) {
+                Ok(Value::Node(one)) => Arc::from([one]),
+                Ok(Value::Nodes(many)) => many,
+                _ => continue,
+            };
+            found.extend(nodes.iter().flatten().copied().filter(|id| graph.contains(*id) && seen.insert(*id)));
+        }
+    }
+    found
 }

@@ -14,7 +14,9 @@ pub(super) fn teach(words: &mut Words<'_>) {
     shapes(words);
     geometries(words);
     short_form(words, "mesh(fields: map) -> Node", "A Mesh from arrays: `mesh(#{ position: [...], index: [0, 1, 2] })`.", "Mesh");
-    short_form(words, "material(fields: map) -> Node", "A PhysicalMaterial.", "PhysicalMaterial");
+    short_form(words, "material(fields: map) -> Node", "A PhysicalMaterial. Also called `physical`.", "PhysicalMaterial");
+    let stage = words.stage.clone();
+    words.form("physical", move |fields: Map| make_with(&stage, "PhysicalMaterial", &fields));
     short_form(words, "phong(fields: map) -> Node", "A Material of the Phong model.", "Material");
     short_form(words, "unlit(fields: map) -> Node", "An UnlitMaterial.", "UnlitMaterial");
     short_form(words, "texture(fields: map) -> Node", "An ImageTexture.", "ImageTexture");

@@ -1,11 +1,11 @@
 //! Node types that a world defines.
 
-use rhai::{Dynamic, FnPtr, Map};
+use rhai::{Dynamic, FnPtr, Map, NativeCallContext, Position};
 use umbriel_fields::{Field, FieldType, Kind, NodeType};
 
 use super::Words;
 use crate::error::{Fault, Outcome, fail, hint};
-use crate::stage::{Definition, Stage};
+use crate::stage::{Definition, Handler, Stage};
 use crate::values::{EmptyList, natural, show};
 
 pub(super) fn teach(words: &mut Words<'_>) {
@@ -15,7 +15,7 @@ pub(super) fn teach(words: &mut Words<'_>) {
         "define(type: string, parts: map)",
         "A node type of your own. `fields` gives names and first values; `evaluate: |me, time|` runs in each frame in which one of \
          the fields was written, or in every frame with `always: true`; `changed: #{ field: |me, value| }` runs when a field changed.",
-        move |name: &str, parts: Map| define(&stage, name, &parts),
+        move |context: NativeCallContext<'_>, name: &str, parts: Map| define(&stage, name, &parts, context.call_position()),
     );
     words.word(
         "list(kind: string) -> list",
@@ -31,13 +31,14 @@ pub(super) fn teach(words: &mut Words<'_>) {
 
 const PARTS: [&str; 5] = ["fields", "evaluate", "changed", "always", "doc"];
 
-fn define(stage: &Stage, name: &str, parts: &Map) -> Outcome<()> {
+fn define(stage: &Stage, name: &str, parts: &Map, place: Position) -> Outcome<()> {
+    let handler = |part: &str, given: &Dynamic| function(name, part, given).map(|call| Handler { call, place });
     if let Some(unknown) = parts.keys().find(|key| !PARTS.contains(&key.as_str())) {
         return fail(format!("define has no part `{unknown}`; it takes {}", PARTS.join(", ")));
     }
     let fields = map_of(parts, "fields")?;
     let changed = map_of(parts, "changed")?;
-    let evaluate = parts.get("evaluate").map(|f| function(name, "evaluate", f)).transpose()?;
+    let evaluate = parts.get("evaluate").map(|f| handler("evaluate", f)).transpose()?;
     let doc = parts.get("doc").map(ToString::to_string).unwrap_or_default();
     let mut node_type = NodeType::new(name, doc);
     for (field, default) in &fields {
@@ -49,8 +50,7 @@ fn define(stage: &Stage, name: &str, parts: &Map) -> Outcome<()> {
             node_type = node_type.always_evaluate();
         }
     }
-    let changed =
-        changed.iter().map(|(field, f)| Ok((field.to_string(), function(name, field, f)?))).collect::<Outcome<Vec<_>>>()?;
+    let changed = changed.iter().map(|(field, f)| Ok((field.to_string(), handler(field, f)?))).collect::<Outcome<Vec<_>>>()?;
     if let Some((field, _)) = changed.iter().find(|(field, _)| node_type.field_index(field).is_none()) {
         return fail(format!("{name} has no field `{field}` to watch{}", hint(field, fields.keys().map(|k| k.as_str()))));
     }

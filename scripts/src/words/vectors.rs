@@ -89,7 +89,7 @@ fn make_turns(words: &mut Words<'_>) {
     words.word(
         "axis_angle(axis: vec3, angle: number) -> quat",
         "A turn about an axis, in radians: `axis_angle(vec3(0, 1, 0), deg(90))`.",
-        { |axis: Vec3, angle: Dynamic| -> Outcome<Quat> { Ok(Rotation { axis, angle_rad: component(&angle)? }.into()) } },
+        |axis: Vec3, angle: Dynamic| -> Outcome<Quat> { Ok(Rotation { axis, angle_rad: component(&angle)? }.into()) },
     );
     words.word(
         "rotation(axis: vec3, angle: number) -> rotation",
@@ -116,7 +116,7 @@ fn make_turns(words: &mut Words<'_>) {
         },
     );
     words.word(
-        "looking(from: vec3, to: vec3) -> quat",
+        "look(from: vec3, to: vec3) -> quat",
         "The turn of a viewpoint at `from` that looks to `to`, upright.",
         |from: Vec3, to: Vec3| -> Quat { looking(to - from) },
     );

@@ -1,0 +1,9 @@
+//! The tests of scripts, as one program: it links once.
+
+mod docs;
+mod limits;
+mod paper;
+mod rows;
+mod running;
+mod support;
+mod worlds;
