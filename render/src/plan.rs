@@ -24,6 +24,8 @@ pub(crate) struct ViewPlan {
     pub(crate) opaque: Vec<Draw>,
     pub(crate) blend_slot: usize,
     pub(crate) blended: Vec<Draw>,
+    /// Those of the opaque shapes that receive no shadows.
+    pub(crate) exempt: Vec<Draw>,
     /// Shadow volumes and what is done with each.
     pub(crate) steps: Vec<Step>,
 }
@@ -131,6 +133,12 @@ pub(crate) fn plan_picture(
             if is_visibility { (Vec::new(), 0) } else { draws.back_to_front(&planes, &view.view_from_world) };
         stats.culled += (outside + blended_outside) as u32;
         stats.views += 1;
+        let exempt = if frame.purposes.is_empty() {
+            Vec::new()
+        } else {
+            let receives = |i: u32| frame.scene.drawables[i as usize].receives_shadow;
+            draws.cull(&planes, |alpha, _, i| alpha != Alpha::Blend && !receives(i)).0
+        };
         let mut uniform = uniform_of(view, rect, frame.scene.exposure);
         let mut slot_with = |first: usize, count: usize| {
             uniform.first_light = first as u32;
@@ -167,6 +175,7 @@ pub(crate) fn plan_picture(
             blend_slot: slot_with(0, frame.lights.order.len()),
             opaque,
             blended,
+            exempt,
             steps,
         });
     }

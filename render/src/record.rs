@@ -111,6 +111,8 @@ impl Recorder<'_> {
             pass = begin_view(encoder, self.clock, "shadow volumes", to, false, number + 1 == view.steps.len());
             self.volumes.draw(&mut pass, step.job, self.views.group(view.base_slot));
             pass.set_stencil_reference(0);
+            pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
+            self.surfaces(&mut pass, &view.exempt, Pass::Exempt);
             match step.then {
                 Then::Light { slot } => {
                     pass.set_bind_group(0, self.views.group(slot), &[]);

@@ -14,7 +14,7 @@ use crate::record::{Drawer, Recorder};
 use crate::screen::Screen;
 use crate::slots::Slots;
 use crate::stats::{FrameStats, Problems};
-use crate::surface::Surface;
+use crate::surface::{Pass, Surface};
 use crate::targets::{Target, ViewTargets};
 use crate::volumes::{VolumeJob, VolumePass};
 use crate::{Error, Gpu, buffer::GrowBuffer, gpu, jobs, surroundings, uniforms};
@@ -178,9 +178,11 @@ impl Renderer {
         }
         for view in &plans {
             self.view_targets.make(device, &self.layouts.picture, view.size, self.frame);
-            let passes = [(view.base_pass(), &view.opaque), (view.add_pass(), &view.opaque)];
-            let used = if view.steps.is_empty() { 1 } else { 2 };
-            for (pass, list) in passes.into_iter().take(used).chain([(crate::surface::Pass::Blend, &view.blended)]) {
+            let mut passes = vec![(view.base_pass(), &view.opaque), (Pass::Blend, &view.blended)];
+            if !view.steps.is_empty() {
+                passes.extend([(view.add_pass(), &view.opaque), (Pass::Exempt, &view.exempt)]);
+            }
+            for (pass, list) in passes {
                 for draw in list {
                     self.surface.make(device, pass, self.draws.batches[draw.batch as usize].kind);
                 }
@@ -294,7 +296,6 @@ impl Renderer {
         let group = if format.is_srgb() { &layer.group_decoding } else { &layer.group };
         let mut pass = crate::record::begin_colour(encoder, None, surface, true);
         pass.set_pipeline(&pipeline);
-        pass.set_bind_group(0, self.views.group(0), &[]);
         pass.set_bind_group(1, group, &[]);
         pass.draw(0..3, 0..1);
         Ok(())

@@ -18,7 +18,7 @@ pub(crate) struct Screen {
     /// Visibility to its place.
     pub(crate) plain: [wgpu::RenderPipeline; 3],
     compose_module: wgpu::ShaderModule,
-    compose_layout: wgpu::PipelineLayout,
+    blit_layout: wgpu::PipelineLayout,
     /// Finished pictures to windows, by the window's format.
     blits: HashMap<wgpu::TextureFormat, wgpu::RenderPipeline>,
 }
@@ -66,7 +66,7 @@ impl Screen {
             exposed: compose("exposed", PICTURE_FORMAT_SRGB),
             plain: compose("plain", PICTURE_FORMAT),
             compose_module,
-            compose_layout,
+            blit_layout: layout("blit", &[None, Some(&layouts.picture)]),
             blits: HashMap::new(),
         }
     }
@@ -75,7 +75,7 @@ impl Screen {
     pub(crate) fn blit(&mut self, device: &wgpu::Device, format: wgpu::TextureFormat) -> &wgpu::RenderPipeline {
         self.blits.entry(format).or_insert_with(|| {
             let target = (format, None, ColorWrites::ALL);
-            pipeline(device, &self.compose_layout, &self.compose_module, "plain", target, None)
+            pipeline(device, &self.blit_layout, &self.compose_module, "plain", target, None)
         })
     }
 }

@@ -20,6 +20,8 @@ pub(crate) enum Pass {
     Visibility,
     /// The same where the stencil is 0.
     VisibilityAdd,
+    /// Sets the stencil to 0 where a shape shows that receives no shadows.
+    Exempt,
 }
 
 /// Pipelines by pass and kind of drawable.
@@ -74,23 +76,29 @@ fn pipeline(
         (Pass::Blend, _) => "blended",
         (Pass::Add, _) => "added",
         (Pass::Visibility | Pass::VisibilityAdd, _) => "visibility",
+        (Pass::Exempt, _) => "nothing",
     };
     let fills_depth = matches!(pass, Pass::Base | Pass::Visibility);
     let adds = matches!(pass, Pass::Add | Pass::VisibilityAdd);
-    let depth_compare = if adds { wgpu::CompareFunction::Equal } else { wgpu::CompareFunction::Greater };
+    let depth_compare = if adds || pass == Pass::Exempt { wgpu::CompareFunction::Equal } else { wgpu::CompareFunction::Greater };
     let sum = |dst_factor| wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,
         dst_factor,
         operation: wgpu::BlendOperation::Add,
     };
     let blend = match pass {
-        Pass::Base | Pass::Visibility => None,
+        Pass::Base | Pass::Visibility | Pass::Exempt => None,
         Pass::Blend => Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
         Pass::Add | Pass::VisibilityAdd => {
             Some(wgpu::BlendState { color: sum(wgpu::BlendFactor::One), alpha: sum(wgpu::BlendFactor::One) })
         }
     };
-    let stencil = if adds { outside_shadow() } else { wgpu::StencilState::default() };
+    let stencil = match pass {
+        Pass::Exempt => without_shadow(),
+        _ if adds => outside_shadow(),
+        _ => wgpu::StencilState::default(),
+    };
+    let write_mask = if pass == Pass::Exempt { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
     let compilation_options = wgpu::PipelineCompilationOptions::default();
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(entry),
@@ -119,7 +127,7 @@ fn pipeline(
             module,
             entry_point: Some(entry),
             compilation_options,
-            targets: &[Some(wgpu::ColorTargetState { format: LINEAR_FORMAT, blend, write_mask: wgpu::ColorWrites::ALL })],
+            targets: &[Some(wgpu::ColorTargetState { format: LINEAR_FORMAT, blend, write_mask })],
         }),
         multiview_mask: None,
         cache: None,
@@ -130,4 +138,10 @@ fn pipeline(
 fn outside_shadow() -> wgpu::StencilState {
     let face = wgpu::StencilFaceState { compare: wgpu::CompareFunction::Equal, ..wgpu::StencilFaceState::IGNORE };
     wgpu::StencilState { front: face, back: face, read_mask: 0xff, write_mask: 0 }
+}
+
+/// Forgets what volumes were counted.
+fn without_shadow() -> wgpu::StencilState {
+    let face = wgpu::StencilFaceState { pass_op: wgpu::StencilOperation::Zero, ..wgpu::StencilFaceState::IGNORE };
+    wgpu::StencilState { front: face, back: face, read_mask: 0xff, write_mask: 0xff }
 }

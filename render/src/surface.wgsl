@@ -229,3 +229,9 @@ fn visibility(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) v
     }
     return vec4<f32>(vec3<f32>(lit), 1.0);
 }
+
+// For what it does to the stencil.
+@fragment
+fn nothing() -> @location(0) vec4<f32> {
+    return vec4<f32>(0.0);
+}

@@ -181,6 +181,8 @@ mod tests {
             let min = 3.0 + step as f32 * 1e-4;
             let (a, b) = snapped(min, min + 10.0, 1024);
             assert!(a <= min && b >= min + 10.0);
+            let texel = (b - a) / 1024.0;
+            assert!((a / texel - (a / texel).round()).abs() < 1e-2, "{a} is no whole number of texels of {texel}");
             starts.insert(a.to_bits());
         }
         assert!(starts.len() <= 3, "{starts:?}");

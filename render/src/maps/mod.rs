@@ -5,10 +5,10 @@ mod cascades;
 mod fit;
 mod keep;
 mod picture;
+mod pipeline;
 
-use crate::cache::VERTEX_BUFFERS;
 use crate::clock::Clock;
-use crate::draws::{Alpha, Caster, Draw, Draws, Kind};
+use crate::draws::{Caster, Draw, Draws, Kind};
 use crate::layouts::Layouts;
 use crate::lights::shines;
 use crate::slots::Slots;
@@ -70,9 +70,7 @@ impl Maps {
         });
         let (texture, whole, layers) = make_texture(device, 1, 1);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor { label: Some("maps"), ..Default::default() });
-        let always = Some(wgpu::CompareFunction::Always);
-        let no_groups = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor::default());
-        let empty = pipeline(device, &module, &no_groups, "empty", None, wgpu::PrimitiveTopology::TriangleList, always, &[]);
+        let empty = pipeline::emptying(device, &module);
         Maps {
             faces: Vec::new(),
             records: Vec::new(),
@@ -182,8 +180,8 @@ impl Maps {
             let planes = Planes::new(&map_from_world);
             face.draws = draws.cull(&planes, |_, casts, _| casts).0;
             for draw in &face.draws {
-                let key = key_of(&draws.batches[draw.batch as usize].kind);
-                self.pipelines.entry(key).or_insert_with(|| make_pipeline(device, &self.module, &self.layout, key));
+                let key = pipeline::key_of(&draws.batches[draw.batch as usize].kind);
+                self.pipelines.entry(key).or_insert_with(|| pipeline::of_kind(device, &self.module, &self.layout, key));
             }
         }
     }
@@ -246,7 +244,7 @@ impl Maps {
 
     /// Sets the pipeline of a kind of caster.
     pub(crate) fn set_pipeline(&self, pass: &mut wgpu::RenderPass<'_>, kind: &Kind) {
-        if let Some(pipeline) = self.pipelines.get(&key_of(kind)) {
+        if let Some(pipeline) = self.pipelines.get(&pipeline::key_of(kind)) {
             pass.set_pipeline(pipeline);
         }
     }
@@ -259,11 +257,6 @@ fn view_of(projection: &Projection) -> uniforms::View {
     view.view_from_world = view.clip_from_world;
     view.eye_in_world = projection.eye.to_array();
     view
-}
-
-/// Topology, and whether there are holes.
-fn key_of(kind: &Kind) -> (u8, bool) {
-    (kind.topology, kind.alpha == Alpha::Mask)
 }
 
 fn make_texture(device: &wgpu::Device, side: u32, layers: u32) -> (wgpu::Texture, wgpu::TextureView, Vec<wgpu::TextureView>) {
@@ -290,58 +283,4 @@ fn make_texture(device: &wgpu::Device, side: u32, layers: u32) -> (wgpu::Texture
     };
     let layers = (0..layers).map(layer).collect();
     (texture, whole, layers)
-}
-
-fn make_pipeline(
-    device: &wgpu::Device,
-    module: &wgpu::ShaderModule,
-    layout: &wgpu::PipelineLayout,
-    (topology, holed): (u8, bool),
-) -> wgpu::RenderPipeline {
-    let topology = crate::surface::topology_of(topology);
-    let (vertex, fragment) = if holed { ("holed", Some("cut")) } else { ("solid", None) };
-    let nearest = Some(wgpu::CompareFunction::Greater);
-    pipeline(device, module, layout, vertex, fragment, topology, nearest, &VERTEX_BUFFERS)
-}
-
-#[allow(clippy::too_many_arguments, reason = "one place where pipelines of this pass are made")]
-fn pipeline(
-    device: &wgpu::Device,
-    module: &wgpu::ShaderModule,
-    layout: &wgpu::PipelineLayout,
-    vertex: &str,
-    fragment: Option<&str>,
-    topology: wgpu::PrimitiveTopology,
-    depth_compare: Option<wgpu::CompareFunction>,
-    buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
-) -> wgpu::RenderPipeline {
-    let compilation_options = wgpu::PipelineCompilationOptions::default();
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("shadow maps"),
-        layout: Some(layout),
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: Some(vertex),
-            compilation_options: compilation_options.clone(),
-            buffers,
-        },
-        // Both sides cast: meshes may be open.
-        primitive: wgpu::PrimitiveState { topology, ..Default::default() },
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: MAP_FORMAT,
-            depth_write_enabled: Some(true),
-            depth_compare,
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState::default(),
-        fragment: fragment.map(|entry_point| wgpu::FragmentState {
-            module,
-            entry_point: Some(entry_point),
-            compilation_options,
-            targets: &[],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
 }

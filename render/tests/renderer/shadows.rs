@@ -125,11 +125,39 @@ fn shadows_take_what_they_should() {
         ("switched off", |s| s.lights[0].shadows = ShadowMethod::None, 0.5),
         ("no caster", |s| s.drawables[1].casts_shadow = false, 0.5),
         ("no receiver", |s| s.drawables[0].receives_shadow = false, 0.5),
+        (
+            "no receiver of a volume",
+            |s| {
+                s.drawables[0].receives_shadow = false;
+                s.lights[0].shadows = ShadowMethod::Volume;
+            },
+            0.5,
+        ),
+        (
+            "no caster of a volume",
+            |s| {
+                s.drawables[1].casts_shadow = false;
+                s.lights[0].shadows = ShadowMethod::Volume;
+            },
+            0.5,
+        ),
+        (
+            "no receiver of a film",
+            |s| {
+                s.drawables[0].receives_shadow = false;
+                s.lights[0].shadows = ShadowMethod::None;
+                let mode = StencilMode::Modulative(Film::default());
+                s.stencil_groups.push(StencilGroup { name: "film".into(), light: 0, casters: vec![1], mode });
+            },
+            0.5,
+        ),
         ("light's own ambient", |s| s.lights[0].ambient_intensity = 0.2, 0.1),
     ] {
         let mut scene = ball_over_floor(light.clone());
         change(&mut scene);
-        assert_colour(shoot(&scene, &look_down()).centre(), [value; 3], name);
+        let shot = shoot(&scene, &look_down());
+        assert_eq!(shot.problems, Vec::<String>::new(), "{name}");
+        assert_colour(shot.centre(), [value; 3], name);
     }
 }
 
