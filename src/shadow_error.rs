@@ -90,7 +90,8 @@ fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
             casting.or((!lights.is_empty()).then_some(0)).ok_or("the world has no light that is on")?
         }
     };
-    let options = TraceOptions { sub_samples: args.sub_samples, ..TraceOptions::default() };
+    // A world may be a kilometre wide, and its lamps stand centimetres from what casts: rays start close to surfaces.
+    let options = TraceOptions { sub_samples: args.sub_samples, eps_scale: 1e-7, ..TraceOptions::default() };
     let problems = session.problems();
     Ok(Subject { scene: std::mem::take(session.scene_mut()), light, view, options, problems })
 }

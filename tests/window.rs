@@ -11,8 +11,8 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A world with one large red ball.
 const RED: &str = r#"
-world.add(shape(make("Sphere", #{ radius: 1.0 }), material(#{ diffuse_color: color(0.0, 0.0, 0.0), emissive_color: color(0.9, 0.0, 0.0) })));
-world.add(transform(#{ translation: vec3(1.2, 0.0, 1.2) }, [shape(make("Box", #{ size: vec3(0.4, 0.4, 0.4) }), material(#{ emissive_color: color(1.0, 1.0, 1.0) }))]));
+world.add(shape(make("Sphere", #{ radius: 1.0 }), make("Material", #{ diffuse_color: color(0.0, 0.0, 0.0), emissive_color: color(0.9, 0.0, 0.0) })));
+world.add(transform(#{ translation: vec3(1.2, 0.0, 1.2) }, [shape(make("Box", #{ size: vec3(0.4, 0.4, 0.4) }), make("UnlitMaterial", #{ emissive_color: color(1.0, 1.0, 1.0) }))]));
 world.add(make("Viewpoint", #{ position: vec3(0.0, 0.0, 6.0) }));
 "#;
 

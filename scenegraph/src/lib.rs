@@ -11,6 +11,7 @@ pub mod extract;
 pub mod geometry;
 pub mod gltf;
 pub mod nodes;
+pub mod screens;
 
 pub use extract::{ExtractStats, Extractor, Problem, Viewpoint};
 pub use nodes::{WORLD, new_graph, node_types};

@@ -2,7 +2,6 @@
 
 mod arrange;
 mod camera;
-mod channels;
 mod display;
 mod eyes;
 mod nodes;
@@ -14,7 +13,7 @@ mod tests;
 pub use crate::error::RigError;
 pub use arrange::Arrangement;
 pub use camera::{Camera, fit_camera};
-pub use channels::{Room, cylinder_screens, room_screens};
 pub use eyes::{Eye, Head};
-pub use off_axis::{ScreenCorners, off_axis};
+pub use off_axis::off_axis;
 pub use pictures::{DESKTOP, Pictures, Rig, Wanted};
+pub use umbriel_scenegraph::screens::{Room, ScreenCorners, cylinder_screens, room_screens};

@@ -3,18 +3,7 @@
 use super::RigError;
 use glam::{DMat3, DVec3, Mat4, Quat, Vec3};
 use umbriel_scene::Frustum;
-
-/// A flat rectangular screen, by three of its corners in the room, metres. Seen from the front, `lower_right` is to the
-/// right of `lower_left`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ScreenCorners {
-    /// Lower left corner.
-    pub lower_left: Vec3,
-    /// Lower right corner.
-    pub lower_right: Vec3,
-    /// Upper left corner.
-    pub upper_left: Vec3,
-}
+use umbriel_scenegraph::screens::ScreenCorners;
 
 /// Sides may differ from a right angle by this much; wall measurements of real installations are not better.
 const SKEW_MAX_RAD: f64 = 0.01;
@@ -188,6 +177,22 @@ mod tests {
         for (eye, screen, near, want) in rows {
             let message = off_axis(Vec3::from(eye), &corners(screen), near).unwrap_err().to_string();
             assert!(message.contains(want), "{screen:?}: {message}");
+        }
+    }
+
+    #[test]
+    fn seven_channels_look_outwards_from_the_centre() {
+        let centre = Vec3::new(1.0, 1.2, -2.0);
+        let screens = cylinder_screens(7, 270f32.to_radians(), 3.0, 2.0, centre);
+        assert_eq!(screens.len(), 7);
+        let half = (270f32 / 14.0).to_radians();
+        for (i, screen) in screens.iter().enumerate() {
+            let (view, f) = off_axis(centre, screen, 0.1).unwrap();
+            // Each channel is symmetric from the centre and spans its share of the angle.
+            assert!((f.right / f.near - half.tan()).abs() < 1e-5 && (f.left + f.right).abs() < 1e-6);
+            let yaw = (i as f32 - 3.0) * half * 2.0;
+            let ahead = centre + Vec3::new(yaw.sin(), 0.0, -yaw.cos());
+            assert!(view.transform_point3(ahead).abs_diff_eq(Vec3::NEG_Z, 1e-5), "channel {i}");
         }
     }
 }
