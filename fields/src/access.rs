@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::graph::slot_of;
 use crate::naming::hint;
+use crate::record::Event;
 use crate::schedule::SILENCED;
 use crate::{EnumValue, Error, Field, FieldId, FieldType, FieldValue, Graph, Kind, NodeId, Revision, SetRule, Value};
 
@@ -64,6 +65,8 @@ impl Graph {
     pub fn set_value(&mut self, field: FieldId, value: Value) -> Result<(), Error> {
         if self.write(field, value)? {
             self.schedule.mark(slot_of(field.node));
+            self.note_write(field, false);
+            self.explain_write(field);
         }
         Ok(())
     }
@@ -73,6 +76,8 @@ impl Graph {
         if self.write(field, value.into())? {
             self.schedule.flags[slot_of(field.node) as usize] |= SILENCED;
             self.silenced.insert(field, self.changes.last());
+            self.note_write(field, true);
+            self.explain_write(field);
         }
         Ok(())
     }
@@ -85,6 +90,8 @@ impl Graph {
         self.columns.revisions_mut(field_type)[slot as usize] = revision;
         self.changes.wrote(slot_of(field.node), revision);
         self.schedule.mark(slot_of(field.node));
+        self.note(|| Event::Touched(field));
+        self.explain_write(field);
         Ok(())
     }
 

@@ -81,6 +81,37 @@ impl BitSet {
         Some(lowest)
     }
 
+    /// The lowest number.
+    #[inline]
+    pub(crate) fn lowest(&self) -> Option<usize> {
+        Some(self.held.min(self.lowest_bit())).filter(|lowest| *lowest != NONE)
+    }
+
+    /// The lowest number from one on.
+    pub(crate) fn next_from(&self, from: usize) -> Option<usize> {
+        let bit = self.next_bit(from);
+        let held = if self.held >= from { self.held } else { NONE };
+        Some(bit.min(held)).filter(|next| *next != NONE)
+    }
+
+    /// The lowest bit from one on, or `NONE`: up until a word has one, and down again.
+    fn next_bit(&self, from: usize) -> usize {
+        let mut at = from;
+        for (height, level) in self.levels.iter().enumerate() {
+            let Some(word) = level.get(at / 64) else { return NONE };
+            let rest = word >> (at % 64) << (at % 64);
+            if rest != 0 {
+                at = at / 64 * 64 + rest.trailing_zeros() as usize;
+                for level in self.levels[..height].iter().rev() {
+                    at = at * 64 + level[at].trailing_zeros() as usize;
+                }
+                return at;
+            }
+            at = at / 64 + 1;
+        }
+        NONE
+    }
+
     /// The lowest bit, or `NONE`.
     #[inline]
     fn lowest_bit(&self) -> usize {
@@ -144,12 +175,14 @@ mod tests {
                 random ^= random << 17;
                 let number = (random >> 20) as usize % capacity;
                 set.reserve(if step < 10 { number + 1 } else { capacity });
-                match random % 5 {
+                match random % 8 {
                     0 => assert_eq!(set.pop_lowest(), model.pop_first()),
                     1 => {
                         set.remove(number);
                         model.remove(&number);
                     }
+                    2 => assert_eq!(set.next_from(number), model.range(number..).next().copied()),
+                    3 => assert_eq!(set.lowest(), model.first().copied()),
                     _ => {
                         set.insert(number);
                         model.insert(number);

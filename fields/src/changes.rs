@@ -2,9 +2,11 @@
 //! revisions that readers asked for.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::NodeId;
+use crate::graph::slot_of;
+use crate::{Graph, NodeId};
 
 /// Counts writes: every write takes the next one. Zero is before the first.
 pub type Revision = u64;
@@ -83,6 +85,18 @@ impl ChangeLog {
         }
     }
 
+    /// Notes a write of nodes whose slots lie beside each other.
+    #[inline]
+    pub(crate) fn wrote_all(&mut self, slots: Range<usize>, revision: Revision) {
+        let boundary = *self.boundary.get_mut();
+        let last = &mut self.nodes[slots.clone()];
+        // The sign says which is later; the and of all signs, that all are.
+        if last.iter().fold(u64::MAX, |all, last| all & boundary.wrapping_sub(*last)) >> 63 == 1 {
+            return last.fill(revision);
+        }
+        slots.for_each(|slot| self.wrote(slot as u32, revision));
+    }
+
     #[inline]
     fn append(&mut self, slot: u32, boundary: Revision) {
         if self.segments.back().is_none_or(|(start, _)| *start != boundary) {
@@ -98,6 +112,16 @@ impl ChangeLog {
             self.floor = self.floor.max(self.deleted[self.deleted.len() / 2].0);
             self.forget_below_floor();
         }
+    }
+
+    /// All node revisions by slot, for a snapshot.
+    pub(crate) fn by_node(&self) -> &[Revision] {
+        &self.nodes
+    }
+
+    /// Takes the place of a fresh log: readers must look at everything.
+    pub(crate) fn restore(&mut self, revision: Revision, nodes: Vec<Revision>) {
+        *self = Self { revision, nodes, boundary: AtomicU64::new(revision), floor: revision, ..Self::default() };
     }
 
     fn limit(&self) -> usize {
@@ -159,5 +183,22 @@ impl ChangeLog {
             return Err("the segments of the change log are out of order".into());
         }
         Ok(())
+    }
+}
+
+impl Graph {
+    /// The revision of the last write. Ask [`Graph::changes_since`] with it later.
+    pub fn revision(&self) -> Revision {
+        self.changes.boundary()
+    }
+
+    /// The revision of the last write of any of the node's fields, of its name, or of its creation; 0 for a deleted node.
+    pub fn node_revision(&self, id: NodeId) -> Revision {
+        if self.contains(id) { self.changes.node(slot_of(id)) } else { 0 }
+    }
+
+    /// Which nodes were written, created, or deleted after a revision.
+    pub fn changes_since(&self, revision: Revision) -> Changes {
+        self.changes.since(revision, &self.ids)
     }
 }

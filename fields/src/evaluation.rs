@@ -6,15 +6,92 @@ use crate::changes::{ChangeLog, Revision};
 use crate::column::Columns;
 use crate::frame::Problem;
 use crate::graph::Node;
-use crate::{Field, FieldId, FieldValue, NodeId, SetRule};
+use crate::kind::for_each_kind;
+use crate::{Field, FieldId, FieldValue, NodeId, SetRule, Value};
+
+/// Where an evaluation reads and writes.
+pub(crate) enum Store<'a> {
+    /// The graph itself.
+    Now { columns: &'a mut Columns, changes: &'a mut ChangeLog },
+    /// The graph as it is before the node's turn; writes are kept for that.
+    Ahead { columns: &'a Columns, writes: &'a mut Vec<Write>, first: usize },
+}
+
+/// A write for later.
+#[derive(Debug)]
+pub(crate) struct Write {
+    pub(crate) index: u16,
+    /// The place in the column of the value's type.
+    pub(crate) slot: u32,
+    pub(crate) value: Value,
+}
+
+impl Store<'_> {
+    #[inline]
+    fn columns(&self) -> &Columns {
+        match self {
+            Store::Now { columns, .. } => columns,
+            Store::Ahead { columns, .. } => columns,
+        }
+    }
+
+    /// What this evaluation wrote into a field, if that waits.
+    #[inline]
+    fn kept(&self, index: u16) -> Option<&Value> {
+        match self {
+            Store::Now { .. } => None,
+            Store::Ahead { writes, first, .. } => {
+                writes[*first..].iter().rev().find(|write| write.index == index).map(|write| &write.value)
+            }
+        }
+    }
+
+    /// Writes now, or keeps the write if it would change anything.
+    #[inline]
+    fn write<T: FieldValue>(&mut self, place: (u32, u16, u32), value: T, compare: bool) {
+        let (node, index, slot) = place;
+        let same = compare && self.kept(index).and_then(T::from_value).is_some_and(|kept| kept.same(&value));
+        match self {
+            Store::Now { columns, changes } => {
+                let revision = changes.last() + 1;
+                if T::column_mut(columns).write(slot, value, compare, revision) {
+                    changes.next();
+                    changes.wrote(node, revision);
+                }
+            }
+            Store::Ahead { columns, writes, first } => {
+                let first_write = !writes[*first..].iter().any(|write| write.index == index);
+                let same = same || compare && first_write && T::column(columns).values[slot as usize].same(&value);
+                if !same {
+                    writes.push(Write { index, slot, value: value.into() });
+                }
+            }
+        }
+    }
+
+    fn write_value(&mut self, place: (u32, u16, u32), value: Value, compare: bool) {
+        write_typed(self, place, value, compare);
+    }
+}
+
+macro_rules! write_typed {
+    ($(($one:ident, $many:ident, $type:ty, $one_column:ident, $many_column:ident, $name:literal, $default:expr))*) => {
+        fn write_typed(store: &mut Store<'_>, place: (u32, u16, u32), value: Value, compare: bool) {
+            match value { $(
+                Value::$one(one) => store.write(place, one, compare),
+                Value::$many(many) => store.write(place, many, compare),
+            )* }
+        }
+    };
+}
+for_each_kind!(write_typed);
 
 /// One evaluation of one node. Fields are addressed by their place in the declaration.
 pub struct Evaluation<'a> {
     pub(crate) id: NodeId,
     pub(crate) slot: u32,
     pub(crate) node: &'a Node,
-    pub(crate) columns: &'a mut Columns,
-    pub(crate) changes: &'a mut ChangeLog,
+    pub(crate) store: Store<'a>,
     pub(crate) silenced: &'a HashMap<FieldId, Revision>,
     pub(crate) problems: &'a mut Vec<Problem>,
     pub(crate) time_s: f64,
@@ -38,10 +115,12 @@ impl Evaluation<'_> {
     pub fn get<T: FieldValue>(&mut self, index: u16) -> T {
         if let Some(field) = self.node.field(index) {
             let slot = self.node.slots[index as usize];
-            if field.field_type == T::TYPE {
-                return T::column(self.columns).values[slot as usize].clone();
+            let kept = self.store.kept(index);
+            if field.field_type == T::TYPE && kept.is_none() {
+                return T::column(self.store.columns()).values[slot as usize].clone();
             }
-            if let Some(value) = self.columns.value(field.field_type, slot).convert(T::TYPE).as_ref().and_then(T::from_value) {
+            let value = kept.cloned().unwrap_or_else(|| self.store.columns().value(field.field_type, slot));
+            if let Some(value) = value.convert(T::TYPE).as_ref().and_then(T::from_value) {
                 return value;
             }
         }
@@ -56,34 +135,31 @@ impl Evaluation<'_> {
         };
         let slot = self.node.slots[index as usize];
         let compare = field.on_set == SetRule::Compare;
-        let revision = self.changes.last() + 1;
-        let written = if field.field_type == T::TYPE && field.range.is_none() {
-            T::column_mut(self.columns).write(slot, value, compare, revision)
-        } else {
-            let Some(value) = value.into().convert(field.field_type) else {
-                let expected = field.field_type;
-                return self.report(format!("{} does not convert to {expected}, the type of `{}`", T::TYPE, field.name));
-            };
-            let value = field.range.map_or(value.clone(), |(smallest, largest)| value.clamped(smallest, largest));
-            self.columns.write(slot, value, compare, revision)
-        };
-        if written {
-            self.changes.next();
-            self.changes.wrote(self.slot, revision);
+        let place = (self.slot, index, slot);
+        if field.field_type == T::TYPE && field.range.is_none() {
+            return self.store.write(place, value, compare);
         }
+        let Some(value) = value.into().convert(field.field_type) else {
+            let expected = field.field_type;
+            return self.report(format!("{} does not convert to {expected}, the type of `{}`", T::TYPE, field.name));
+        };
+        let value = field.range.map_or(value.clone(), |(smallest, largest)| value.clamped(smallest, largest));
+        self.store.write_value(place, value, compare);
     }
 
     /// True if the field was written since the last evaluation, or since the node was created.
     pub fn changed(&self, index: u16) -> bool {
         let Some(field) = self.node.field(index) else { return false };
-        let revision = self.columns.revisions(field.field_type)[self.node.slots[index as usize] as usize];
-        revision > self.evaluated && self.silenced.get(&FieldId { node: self.id, index }) != Some(&revision)
+        let revision = self.store.columns().revisions(field.field_type)[self.node.slots[index as usize] as usize];
+        self.store.kept(index).is_some()
+            || revision > self.evaluated && self.silenced.get(&FieldId { node: self.id, index }) != Some(&revision)
     }
 
     /// True if the field was ever written, since the node was created.
     pub fn written(&self, index: u16) -> bool {
         let Some(field) = self.node.field(index) else { return false };
-        self.columns.revisions(field.field_type)[self.node.slots[index as usize] as usize] > self.node.created
+        self.store.kept(index).is_some()
+            || self.store.columns().revisions(field.field_type)[self.node.slots[index as usize] as usize] > self.node.created
     }
 
     /// The declarations of the node's fields with their places.

@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeSet, HashSet};
 
-use crate::evaluation::Evaluation;
+use crate::evaluation::{Evaluation, Store};
 use crate::graph::slot_of;
 use crate::propagate::Carried;
+use crate::record::Event;
 use crate::schedule::{EVALUATES, IN_TURN, OBSERVED, ROUTED, SILENCED};
 use crate::{Error, Evaluator, FieldId, Graph, Mode, NodeId, Strength};
 
@@ -55,10 +56,12 @@ pub(crate) struct FrameState {
     pub(crate) always: BTreeSet<u32>,
     pub(crate) dependencies: Vec<(NodeId, NodeId)>,
     /// Nodes that are evaluated only when asked for, and were.
-    asked: HashSet<u32>,
+    pub(crate) asked: HashSet<u32>,
     pub(crate) carried: Vec<Carried>,
-    time_s: f64,
+    pub(crate) time_s: f64,
     pub(crate) report: FrameReport,
+    /// Counts the calls of `evaluate`.
+    pub(crate) number: u64,
 }
 
 impl FrameState {
@@ -81,11 +84,14 @@ impl Graph {
             };
         }
         self.frame.time_s = time_s;
+        self.frame.number += 1;
+        self.note(|| Event::Frame(time_s));
         let idle = self.schedule.is_idle() && self.frame.always.is_empty() && self.frame.carried.is_empty();
         if !idle {
             self.run_frame(host);
         }
         self.frame.dependencies.clear();
+        self.note(|| Event::Leave);
         std::mem::take(&mut self.frame.report)
     }
 
@@ -94,13 +100,23 @@ impl Graph {
         for slot in &self.frame.always {
             self.schedule.mark(*slot);
         }
+        self.schedule.rank_pending();
         self.refresh_order();
         self.schedule.start();
-        while let Some(slot) = self.schedule.next() {
+        while let Some(slot) = self.next_turn() {
             self.turn(slot, host);
         }
+        self.ahead.end_frame();
         self.schedule.running = false;
         self.frame.asked.clear();
+    }
+
+    #[inline]
+    fn next_turn(&mut self) -> Option<u32> {
+        if self.ahead.threads > 1 {
+            self.evaluate_ahead();
+        }
+        self.schedule.next()
     }
 
     /// The time of the frame that is or was last evaluated, in seconds.
@@ -129,6 +145,7 @@ impl Graph {
     /// Changes when a node is evaluated; its type says when at first.
     pub fn set_mode(&mut self, id: NodeId, mode: Mode) -> Result<(), Error> {
         self.node(id)?;
+        self.note(|| Event::ModeSet(id, mode));
         let slot = slot_of(id);
         self.nodes[id].mode = mode;
         self.frame.always.remove(&slot);
@@ -147,6 +164,7 @@ impl Graph {
     /// Has a node evaluated in the next frame, or in this one if it has not had its turn, changed or not.
     pub fn wake(&mut self, id: NodeId) -> Result<(), Error> {
         self.node(id)?;
+        self.note(|| Event::Woken(id));
         self.schedule.mark(slot_of(id));
         Ok(())
     }
@@ -158,6 +176,7 @@ impl Graph {
         if self.schedule.flags[slot_of(id) as usize] & IN_TURN != 0 {
             return Err(Error::Evaluating { what: "pulling a node out of its own evaluation" });
         }
+        self.note(|| Event::Pulled(id));
         for source in self.pulled_with(id) {
             let slot = slot_of(source);
             let Some(turn) = self.contains(source).then(|| self.schedule.turns[slot as usize]) else { continue };
@@ -207,9 +226,10 @@ impl Graph {
         if (flags & !(ROUTED | SILENCED) != 0 || asked) && !self.live_turn(slot, asked, host) {
             return;
         }
-        let before = std::mem::replace(&mut self.schedule.turns[slot as usize].propagated, self.changes.last());
         if self.schedule.flags[slot as usize] & ROUTED != 0 {
-            self.copy_out(slot, before);
+            self.copy_out(slot);
+        } else {
+            self.schedule.turns[slot as usize].propagated = self.changes.last();
         }
     }
 
@@ -234,49 +254,13 @@ impl Graph {
         for due in self.observers_due(id) {
             let Some(observer) = self.observers.all.get(due).copied() else { continue };
             self.observers.all[due].seen = self.field_revision(observer.field);
-            host.field_changed(self, observer.field, observer.token);
+            self.note(|| Event::Told(observer.field, observer.token));
+            self.tell_explained(observer.field, observer.token, host);
+            self.note(|| Event::Leave);
             if !self.contains(id) {
                 return false;
             }
         }
-        true
-    }
-
-    /// False if the node was deleted on the way.
-    fn evaluate_node(&mut self, id: NodeId, host: &mut dyn Host) -> bool {
-        let slot = slot_of(id);
-        let node = &self.nodes[id];
-        self.frame.report.evaluated += 1;
-        let turn = &mut self.schedule.turns[slot as usize];
-        turn.count = turn.count.wrapping_add(1);
-        match &node.node_type.evaluator {
-            Evaluator::None => {}
-            Evaluator::Native(evaluate) => {
-                let mut evaluation = Evaluation {
-                    id,
-                    slot,
-                    node,
-                    columns: &mut self.columns,
-                    changes: &mut self.changes,
-                    silenced: &self.silenced,
-                    problems: &mut self.frame.report.problems,
-                    time_s: self.frame.time_s,
-                    evaluated: turn.evaluated,
-                    again: false,
-                };
-                evaluate(&mut evaluation);
-                if evaluation.again {
-                    self.schedule.again(slot);
-                }
-            }
-            Evaluator::Host => {
-                host.evaluate(self, id);
-                if !self.contains(id) {
-                    return false;
-                }
-            }
-        }
-        self.schedule.turns[slot as usize].evaluated = self.changes.last();
         true
     }
 }

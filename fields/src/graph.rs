@@ -1,4 +1,4 @@
-//! The graph: nodes, their names, and their dynamic fields.
+//! The graph: nodes that come and go, and what they are made of.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -6,15 +6,18 @@ use std::sync::Arc;
 
 use slotmap::{Key, SlotMap};
 
+use crate::ahead::Ahead;
 use crate::changes::ChangeLog;
-use crate::column::{Columns, FREE};
+use crate::column::Columns;
+use crate::explain::Explain;
 use crate::frame::FrameState;
 use crate::naming::{canonical, hint};
 use crate::observe::Observers;
 use crate::program::Programs;
+use crate::record::{Event, Journal};
 use crate::route::Routes;
 use crate::schedule::{EVALUATES, Schedule};
-use crate::{Changes, Error, Evaluator, Field, Kind, Mode, NodeType, Revision, TypeRegistry, Value};
+use crate::{Error, Evaluator, Field, Kind, Mode, NodeType, Revision, TypeRegistry};
 
 slotmap::new_key_type! {
     /// A node. Ids of deleted nodes are never valid again.
@@ -69,7 +72,7 @@ impl Node {
         all.enumerate().filter_map(|(index, field)| Some((index as u16, field?)))
     }
 
-    fn index_of(&self, name: &str) -> Option<u16> {
+    pub(crate) fn index_of(&self, name: &str) -> Option<u16> {
         if let Some(index) = self.node_type.field_index(name) {
             return Some(index);
         }
@@ -103,9 +106,14 @@ pub struct Graph {
     pub(crate) programs: Programs,
     pub(crate) observers: Observers,
     pub(crate) frame: FrameState,
+    pub(crate) ahead: Ahead,
+    /// Why fields were written, while somebody wants to know.
+    pub(crate) explain: Option<Box<Explain>>,
+    /// What happens from outside, if somebody records.
+    pub(crate) journal: Option<Journal>,
     /// The revision of fields that were last written silently.
     pub(crate) silenced: HashMap<FieldId, Revision>,
-    names: HashMap<Arc<str>, NodeId>,
+    pub(crate) names: HashMap<Arc<str>, NodeId>,
     /// What a deleted node's type is said to be.
     deleted_type: Arc<NodeType>,
 }
@@ -130,8 +138,11 @@ impl Graph {
             programs: Programs::default(),
             observers: Observers::default(),
             frame: FrameState::default(),
+            ahead: Ahead::default(),
+            explain: None,
             silenced: HashMap::new(),
             names: HashMap::new(),
+            journal: None,
             deleted_type: Arc::new(NodeType::new("(deleted)", "A node that does not exist any more.")),
         }
     }
@@ -150,6 +161,7 @@ impl Graph {
     /// Creates a node of a type that the registry or another node gave.
     pub fn create_of(&mut self, node_type: Arc<NodeType>) -> NodeId {
         let created = self.changes.next();
+        let type_of_new = node_type.clone();
         let (mode, fields) = (node_type.mode, node_type.fields.len());
         let id = self.nodes.insert(Node {
             node_type,
@@ -180,6 +192,7 @@ impl Graph {
         if mode == Mode::Always {
             self.frame.always.insert(slot);
         }
+        self.note(|| Event::Created(id, type_of_new));
         id
     }
 
@@ -202,9 +215,11 @@ impl Graph {
         self.programs.forget(slot);
         self.schedule.deleted(slot);
         self.frame.forget(slot);
+        self.forget_explained(id);
         self.ids[slot as usize] = NodeId::default();
         let revision = self.changes.next();
         self.changes.deleted(id, revision);
+        self.note(|| Event::Deleted(id));
         Ok(())
     }
 
@@ -230,58 +245,6 @@ impl Graph {
 
     pub(crate) fn node(&self, id: NodeId) -> Result<&Node, Error> {
         self.nodes.get(id).ok_or(Error::DeadNode)
-    }
-
-    /// Names a node; the empty name takes its name away. Names are unique in a graph.
-    pub fn set_name(&mut self, id: NodeId, name: &str) -> Result<(), Error> {
-        self.node(id)?;
-        if let Some(other) = self.names.get(name).copied().filter(|other| *other != id) {
-            let (node, other) = (self.describe(id), self.describe(other));
-            return Err(Error::DuplicateName { node, name: name.into(), other });
-        }
-        let node = &mut self.nodes[id];
-        if let Some(old) = node.name.take() {
-            self.names.remove(&old);
-        }
-        if !name.is_empty() {
-            let name: Arc<str> = name.into();
-            node.name = Some(name.clone());
-            self.names.insert(name, id);
-        }
-        let revision = self.changes.next();
-        self.changes.wrote(slot_of(id), revision);
-        Ok(())
-    }
-
-    /// The node's name, if it has one.
-    pub fn name(&self, id: NodeId) -> Option<&str> {
-        self.nodes.get(id)?.name.as_deref()
-    }
-
-    /// The node of a name.
-    pub fn find(&self, name: &str) -> Option<NodeId> {
-        self.names.get(name).copied()
-    }
-
-    /// All names, in no particular order; for messages.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.names.keys().map(|name| &**name)
-    }
-
-    /// The node at the end of a path of names, such as `/world/house/door`: each is among the `children` of the one before.
-    pub fn find_path(&self, path: &str) -> Option<NodeId> {
-        let mut names = path.split('/').filter(|name| !name.is_empty());
-        let mut at = self.find(names.next()?)?;
-        for name in names {
-            let next = self.find(name)?;
-            let children = self.value(self.field(at, "children").ok()?).ok()?;
-            let Value::Nodes(children) = children else { return None };
-            if !children.contains(&Some(next)) {
-                return None;
-            }
-            at = next;
-        }
-        Some(at)
     }
 
     /// The field of a name or alias, in any spelling; the error names the nearest one.
@@ -310,95 +273,6 @@ impl Graph {
     /// The ids of a node's fields with their declarations.
     pub fn field_ids(&self, id: NodeId) -> impl Iterator<Item = (FieldId, &Field)> {
         self.nodes.get(id).into_iter().flat_map(Node::fields).map(move |(index, field)| (FieldId { node: id, index }, field))
-    }
-
-    /// Gives one node a field that its type does not have.
-    pub fn add_field(&mut self, id: NodeId, field: Field) -> Result<FieldId, Error> {
-        let node = self.node(id)?;
-        if let Some(fault) = field.fault() {
-            return Err(Error::BadField { node: self.describe(id), fault });
-        }
-        for name in std::iter::once(&field.name).chain(&field.aliases) {
-            if node.index_of(name).is_some() {
-                return Err(Error::DuplicateField { node: self.describe(id), name: name.to_string() });
-            }
-        }
-        let declared = node.node_type.fields.len();
-        let place = node.dynamic.iter().position(Option::is_none).unwrap_or(node.dynamic.len());
-        let Some(index) = u16::try_from(declared + place).ok().filter(|index| *index < u16::MAX) else {
-            return Err(Error::BadField { node: self.describe(id), fault: format!("it has {} fields already", u16::MAX) });
-        };
-        let revision = self.changes.next();
-        let slot = self.columns.insert(field.default.clone(), (slot_of(id), index), revision);
-        let node = &mut self.nodes[id];
-        if place == node.dynamic.len() {
-            node.dynamic.push(None);
-            node.slots.push(FREE);
-        }
-        node.dynamic[place] = Some(field);
-        node.slots[index as usize] = slot;
-        self.changes.wrote(slot_of(id), revision);
-        self.schedule.mark(slot_of(id));
-        Ok(FieldId { node: id, index })
-    }
-
-    /// Removes a field that was added to one node, with its routes and observers.
-    pub fn remove_field(&mut self, field: FieldId) -> Result<(), Error> {
-        let declared = self.declaration(field)?;
-        let field_type = declared.field_type;
-        let first_dynamic = self.nodes[field.node].node_type.fields.len();
-        if (field.index as usize) < first_dynamic {
-            return Err(Error::NotDynamic { field: self.describe_field(field) });
-        }
-        for route in self.routes_from(field).chain(self.routes_to(field)).collect::<Vec<_>>() {
-            self.disconnect(route);
-        }
-        self.forget_observers_of(field);
-        self.silenced.remove(&field);
-        let node = &mut self.nodes[field.node];
-        node.dynamic[field.index as usize - first_dynamic] = None;
-        let slot = std::mem::replace(&mut node.slots[field.index as usize], FREE);
-        self.columns.remove(field_type, slot);
-        let revision = self.changes.next();
-        self.changes.wrote(slot_of(field.node), revision);
-        Ok(())
-    }
-
-    /// The revision of the last write. Ask [`Graph::changes_since`] with it later.
-    pub fn revision(&self) -> Revision {
-        self.changes.boundary()
-    }
-
-    /// The revision of the last write of any of the node's fields, of its name, or of its creation; 0 for a deleted node.
-    pub fn node_revision(&self, id: NodeId) -> Revision {
-        if self.contains(id) { self.changes.node(slot_of(id)) } else { 0 }
-    }
-
-    /// Which nodes were written, created, or deleted after a revision.
-    pub fn changes_since(&self, revision: Revision) -> Changes {
-        self.changes.since(revision, &self.ids)
-    }
-
-    /// Name and type of a node, for messages.
-    pub fn describe(&self, id: NodeId) -> String {
-        match self.nodes.get(id) {
-            None => "a deleted node".into(),
-            Some(Node { name: Some(name), node_type, .. }) => format!("`{name}` ({})", node_type.name),
-            Some(node) => format!("an unnamed {}", node.node_type.name),
-        }
-    }
-
-    /// Node and field, for messages: `` `door`.angle ``.
-    pub fn describe_field(&self, field: FieldId) -> String {
-        let name = self.nodes.get(field.node).and_then(|node| node.field(field.index)).map_or("(removed)", |field| &field.name);
-        match self.name(field.node) {
-            Some(node) => format!("`{node}.{name}`"),
-            None => format!("`{name}` of {}", self.describe(field.node)),
-        }
-    }
-
-    pub(crate) fn dead_field(&self, field: FieldId) -> Error {
-        Error::DeadField { node: self.describe(field.node), index: field.index }
     }
 
     /// True if the field holds node references.

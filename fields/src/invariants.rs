@@ -2,6 +2,7 @@
 
 use crate::Graph;
 use crate::graph::slot_of;
+use crate::program::Program;
 use crate::schedule::{NO_RANK, OBSERVED, ROUTED};
 use crate::{FieldId, NodeId, Strength};
 
@@ -72,9 +73,8 @@ impl Graph {
             return Err(format!("{listed} ends of {} routes", self.routes.all.len()));
         }
         for id in self.nodes.keys() {
-            if let Some(program) = self.programs.get(slot_of(id))
-                && *program != self.compile(id)
-            {
+            let program = self.programs.get(slot_of(id));
+            if *program != Program::Unmade && *program != self.compile(id) {
                 return Err(format!("the copy list of {} is out of date", self.describe(id)));
             }
         }

@@ -8,22 +8,29 @@
 //!
 //! A node type is declared once ([`NodeType`], [`Field`]); scripts, importers, files and inspectors all read that declaration.
 //!
-//! This crate knows nothing of 3D, of files, of scripts, of threads or of the clock: time comes in with each frame, and what it cannot do
+//! This crate knows nothing of 3D, of scripts or of the clock: time comes in with each frame, and what it cannot do
 //! itself (script types, callbacks) it asks of a [`Host`]. There is no push on set: a write is a value until the next frame. There are no
 //! scans over all nodes: what did not change costs nothing.
 
 mod access;
+mod ahead;
 mod bits;
 mod changes;
+mod codec;
 mod column;
 mod convert;
+mod copy;
+mod costs;
+mod dynamic;
 mod error;
 mod evaluation;
+mod explain;
 mod field;
 mod frame;
 mod graph;
 mod invariants;
 mod kind;
+mod names;
 mod naming;
 mod node_type;
 mod nodes;
@@ -31,15 +38,21 @@ mod observe;
 mod order;
 mod program;
 mod propagate;
+pub mod record;
 mod registry;
 mod route;
+pub mod save;
 mod schedule;
+mod turn;
 mod value;
+mod why;
 
 pub use changes::{Changes, Revision};
 pub use convert::converts;
+pub use costs::Cost;
 pub use error::Error;
 pub use evaluation::Evaluation;
+pub use explain::By;
 pub use field::{Field, SetRule};
 pub use frame::{FrameReport, Host, NoHost, Problem};
 pub use graph::{FieldId, Graph, NodeId};
@@ -51,3 +64,4 @@ pub use observe::ObserverId;
 pub use registry::TypeRegistry;
 pub use route::{Endpoint, Route, RouteId, Strength};
 pub use value::{FieldValue, Same, Value};
+pub use why::Cause;

@@ -6,6 +6,7 @@ use slotmap::SlotMap;
 
 use crate::changes::Revision;
 use crate::graph::slot_of;
+use crate::record::Event;
 use crate::schedule::OBSERVED;
 use crate::{Error, FieldId, Graph, NodeId};
 
@@ -27,7 +28,7 @@ pub(crate) struct Observer {
 pub(crate) struct Observers {
     pub(crate) all: SlotMap<ObserverId, Observer>,
     /// By node slot, in the order in which they came.
-    by_slot: HashMap<u32, Vec<ObserverId>>,
+    pub(crate) by_slot: HashMap<u32, Vec<ObserverId>>,
 }
 
 impl Observers {
@@ -50,6 +51,7 @@ impl Graph {
         let observer = self.observers.all.insert(Observer { field, token, seen: self.changes.last() });
         self.observers.by_slot.entry(slot).or_default().push(observer);
         self.schedule.flags[slot as usize] |= OBSERVED;
+        self.note(|| Event::Observed { observer, field, token });
         Ok(observer)
     }
 
@@ -64,6 +66,7 @@ impl Graph {
                 self.schedule.flags[slot as usize] &= !OBSERVED;
             }
         }
+        self.note(|| Event::Unobserved(observer));
         true
     }
 

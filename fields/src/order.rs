@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use crate::graph::slot_of;
+use crate::record::Event;
 use crate::schedule::NO_RANK;
 use crate::{Error, Graph, NodeId, RouteId, Strength};
 
@@ -131,8 +132,12 @@ impl Graph {
             waits_for[*slot as usize] += strong as u32;
         }
         let mut order: Vec<u32> = slots.iter().copied().filter(|slot| waits_for[*slot as usize] == 0).collect();
-        let mut done = 0;
+        let (mut done, mut levels) = (0, Vec::new());
         while let Some(slot) = order.get(done).copied() {
+            // What no node of the levels so far has to wait for is the next level: first in, first out keeps them apart.
+            if levels.last().is_none_or(|end| *end == done) {
+                levels.push(order.len());
+            }
             done += 1;
             let outgoing = self.nodes[self.ids[slot as usize]].outgoing.iter().map(|route| &self.routes.all[*route]);
             let strong = outgoing.filter(|route| route.strength == Strength::Strong).map(|route| slot_of(route.to.node));
@@ -146,7 +151,7 @@ impl Graph {
         if order.len() < slots.len() {
             return Err(slots.len() - order.len());
         }
-        self.schedule.set_order(order);
+        self.schedule.set_order(order, levels.into_iter().map(|end| end as u32).collect());
         Ok(())
     }
 
@@ -160,6 +165,7 @@ impl Graph {
     pub fn depend_for_this_frame(&mut self, node: NodeId, on: NodeId) -> Result<(), Error> {
         self.node(node)?;
         self.node(on)?;
+        self.note(|| Event::Depends(node, on));
         let (later, earlier) = (slot_of(node), slot_of(on));
         let (before, after) = (self.schedule.ranked(earlier), self.schedule.ranked(later));
         self.frame.dependencies.push((node, on));

@@ -1,9 +1,10 @@
 //! From field to field: what a node's turn copies along its routes.
 
 use crate::changes::{ChangeLog, Revision};
+use crate::copy::Copier;
 use crate::frame::FrameState;
 use crate::graph::slot_of;
-use crate::program::{Group, copy_group};
+use crate::program::{Group, Hop, Program, Run};
 use crate::route::Arrival;
 use crate::schedule::SILENCED;
 use crate::{Field, FieldId, Graph, Route, RouteId, SetRule, Value};
@@ -11,9 +12,9 @@ use crate::{Field, FieldId, Graph, Route, RouteId, SetRule, Value};
 /// A value on its way along a weak route.
 #[derive(Debug)]
 pub(crate) struct Carried {
-    route: RouteId,
-    value: Value,
-    written: Revision,
+    pub(crate) route: RouteId,
+    pub(crate) value: Value,
+    pub(crate) written: Revision,
 }
 
 impl FrameState {
@@ -28,42 +29,61 @@ impl FrameState {
 }
 
 impl Graph {
-    /// Copies along the node's routes what was written after a revision.
+    /// Copies along the node's routes what was written since its last turn.
     #[inline]
-    pub(crate) fn copy_out(&mut self, slot: u32, before: Revision) {
-        if self.schedule.flags[slot as usize] & SILENCED != 0 || !self.copy_out_fast(slot, before) {
-            self.copy_out_slowly(slot, before);
-        }
-    }
-
-    /// Runs a program that is up to date and has only direct copies; false if there is none.
-    #[inline]
-    fn copy_out_fast(&mut self, slot: u32, before: Revision) -> bool {
-        let Some(program) = self.programs.get(slot) else { return false };
-        if program.iter().any(|group| !group.slow.is_empty() || !group.weak.is_empty()) {
-            return false;
-        }
-        for group in program {
-            let written = self.columns.revisions(group.field_type)[group.source as usize];
-            if written > before {
-                let revision = self.changes.last() + 1;
-                let copied = copy_group(&mut self.columns, &mut self.changes, &mut self.schedule, group, written, revision);
-                self.frame.copied(&mut self.changes, copied);
+    pub(crate) fn copy_out(&mut self, slot: u32) {
+        let plain = self.schedule.flags[slot as usize] & SILENCED == 0 && self.explain.is_none();
+        let mut copier = Copier { columns: &mut self.columns, changes: &mut self.changes, schedule: &mut self.schedule };
+        match self.programs.get(slot) {
+            Program::Hop(hop) if plain => {
+                self.frame.report.copied += copier.chain(&self.programs, slot, *hop);
             }
+            Program::Direct(groups) if plain => {
+                let before = std::mem::replace(&mut copier.schedule.turns[slot as usize].propagated, copier.changes.last());
+                for group in groups.iter() {
+                    let written = copier.columns.revisions(group.field_type)[group.source as usize];
+                    if written > before {
+                        let revision = copier.changes.last() + 1;
+                        let copied = copier.group(group, written, revision);
+                        self.frame.copied(copier.changes, copied);
+                    }
+                }
+            }
+            _ => self.copy_out_slowly(slot),
         }
-        true
     }
 
-    fn copy_out_slowly(&mut self, slot: u32, before: Revision) {
-        let program = self.programs.take(slot).unwrap_or_else(|| self.compile(self.ids[slot as usize]));
+    fn copy_out_slowly(&mut self, slot: u32) {
+        let before = std::mem::replace(&mut self.schedule.turns[slot as usize].propagated, self.changes.last());
+        let mut program = self.programs.take(slot);
+        if program == Program::Unmade {
+            program = self.compile(self.ids[slot as usize]);
+        }
+        let hop;
+        let groups = match &program {
+            Program::Unmade => &[][..],
+            Program::Hop(one) => {
+                hop = [self.hop_as_group(slot, *one)];
+                &hop
+            }
+            Program::Direct(groups) | Program::Mixed(groups) => groups,
+        };
         let silenced = self.schedule.flags[slot as usize] & SILENCED != 0;
-        for group in &program {
+        for group in groups {
             let written = self.columns.revisions(group.field_type)[group.source as usize];
             if written > before && !(silenced && self.is_silenced(slot, group.index, written)) {
-                self.run_group(group, written);
+                self.run_group(slot, group, written);
             }
         }
         self.programs.put(slot, program);
+    }
+
+    fn hop_as_group(&self, slot: u32, hop: Hop) -> Group {
+        let Hop { source, target, node, field_type, compare } = hop;
+        let (owner, index) = self.columns.owners(field_type)[source as usize];
+        debug_assert_eq!(owner, slot);
+        let direct = Box::new([Run { slot: target, node, count: 1, compare }]);
+        Group { index, field_type, source, direct, slow: Box::default(), weak: Box::default() }
     }
 
     fn is_silenced(&self, slot: u32, index: u16, written: Revision) -> bool {
@@ -72,12 +92,13 @@ impl Graph {
 
     /// One write of a source is one write of all its targets: they share a revision.
     #[inline]
-    fn run_group(&mut self, group: &Group, written: Revision) {
+    fn run_group(&mut self, slot: u32, group: &Group, written: Revision) {
         let revision = self.changes.last() + 1;
         let mut copied = 0;
         if !group.direct.is_empty() {
             let (columns, changes, schedule) = (&mut self.columns, &mut self.changes, &mut self.schedule);
-            copied = copy_group(columns, changes, schedule, group, written, revision);
+            copied = Copier { columns, changes, schedule }.group(group, written, revision);
+            self.explain_group(slot, group, revision);
         }
         if !group.slow.is_empty() {
             let value = self.columns.value(group.field_type, group.source);
@@ -85,6 +106,7 @@ impl Graph {
         }
         self.frame.copied(&mut self.changes, copied);
         if !group.weak.is_empty() {
+            self.explain_departure(slot, group);
             self.depart(group);
         }
     }
@@ -107,8 +129,8 @@ impl Graph {
     }
 
     /// Delivers a value along a route, unless the target was written later than the source, or a route with a later write was here before.
-    fn deliver(&mut self, route: RouteId, value: &Value, written: Revision, revision: Revision) -> bool {
-        let Some(route) = self.routes.all.get(route).copied() else { return false };
+    fn deliver(&mut self, id: RouteId, value: &Value, written: Revision, revision: Revision) -> bool {
+        let Some(route) = self.routes.all.get(id).copied() else { return false };
         let Ok((target, slot)) = self.place(route.to) else { return false };
         let (field_type, compare) = (target.field_type, target.on_set == SetRule::Compare);
         let fan_in = self.is_fan_in(route.to);
@@ -123,6 +145,7 @@ impl Graph {
         if copied {
             self.changes.wrote(slot_of(route.to.node), revision);
             self.schedule.mark(slot_of(route.to.node));
+            self.explain_route(id);
         }
         if fan_in {
             let delivered = if copied { revision } else { last };
@@ -147,6 +170,7 @@ impl Graph {
             self.changes.next();
             self.changes.wrote(slot_of(to.node), revision);
             self.schedule.mark(slot_of(to.node));
+            self.explain_route(route);
         }
     }
 }

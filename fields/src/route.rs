@@ -8,6 +8,7 @@ use slotmap::SlotMap;
 use crate::changes::Revision;
 use crate::graph::slot_of;
 use crate::order::closes_loop;
+use crate::record::Event;
 use crate::schedule::ROUTED;
 use crate::{Error, FieldId, Graph, Kind, NodeId, converts};
 
@@ -90,7 +91,7 @@ pub(crate) struct Arrival {
 #[derive(Debug, Default)]
 pub(crate) struct Routes {
     pub(crate) all: SlotMap<RouteId, Route>,
-    made: u64,
+    pub(crate) made: u64,
     /// Of fields into which several routes go.
     pub(crate) arrivals: HashMap<FieldId, Arrival>,
 }
@@ -100,6 +101,14 @@ impl Graph {
     ///
     /// Errors: types that do not convert, a route that exists, and strong routes that would form a loop.
     pub fn connect(&mut self, from: FieldId, to: FieldId, strength: Strength) -> Result<RouteId, Error> {
+        let route = self.link(from, to, strength)?;
+        self.note(|| Event::Connected { route, from, to, strength });
+        self.deliver_at_once(route);
+        Ok(route)
+    }
+
+    /// Makes a route that delivers nothing before its source is written again; for files, whose values are as they should be.
+    pub(crate) fn link(&mut self, from: FieldId, to: FieldId, strength: Strength) -> Result<RouteId, Error> {
         self.check_types(from, to)?;
         if self.route_between(from, to).is_some() {
             return Err(Error::DuplicateRoute { from: self.describe_field(from), to: self.describe_field(to) });
@@ -122,7 +131,6 @@ impl Graph {
         self.schedule.flags[slot_of(from.node) as usize] |= ROUTED;
         self.programs.forget(slot_of(from.node));
         self.forget_program_of_other_route(to, route);
-        self.deliver_at_once(route);
         Ok(route)
     }
 
@@ -145,6 +153,7 @@ impl Graph {
         }
         self.programs.forget(slot_of(removed.from.node));
         self.forget_program_of_other_route(removed.to, route);
+        self.note(|| Event::Disconnected(route));
         true
     }
 

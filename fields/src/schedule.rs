@@ -1,5 +1,7 @@
 //! Whose turn it is: flags, ranks and the set of nodes that wait for their turn in this frame or the next.
 
+use std::ops::Range;
+
 use crate::bits::BitSet;
 use crate::changes::Revision;
 
@@ -48,10 +50,12 @@ pub(crate) struct Schedule {
     /// Ranks of nodes that wait for their turn in this frame.
     queue: BitSet,
     /// Slots of nodes that wait for the next frame.
-    pending: Vec<u32>,
+    pub(crate) pending: Vec<u32>,
     pub(crate) frame: u64,
     pub(crate) running: bool,
-    holes: usize,
+    pub(crate) holes: usize,
+    /// Where the levels of the order end, by rank: nodes of a level have no strong routes between each other. Nodes that came later follow.
+    pub(crate) levels: Vec<u32>,
 }
 
 impl Schedule {
@@ -94,6 +98,21 @@ impl Schedule {
         }
     }
 
+    /// Marks nodes whose slots lie beside each other.
+    #[inline]
+    pub(crate) fn mark_all(&mut self, slots: Range<usize>) {
+        let any = self.flags[slots.clone()].iter().fold(0, |any, flags| any | flags);
+        if any & INTEREST != 0 {
+            slots.for_each(|slot| self.mark(slot as u32));
+        }
+    }
+
+    /// The rank of the first node that waits for its turn in this frame, or `usize::MAX`.
+    #[inline]
+    pub(crate) fn lowest_waiting(&self) -> usize {
+        self.queue.lowest().unwrap_or(usize::MAX)
+    }
+
     /// Asks for a turn even if nobody would hear of it.
     #[inline]
     pub(crate) fn enqueue(&mut self, slot: u32) {
@@ -115,6 +134,34 @@ impl Schedule {
     /// True if no node waits.
     pub(crate) fn is_idle(&self) -> bool {
         self.pending.is_empty()
+    }
+
+    /// Gives all that wait a place in the order, and asks for a new order once as many came since the last one as it has.
+    pub(crate) fn rank_pending(&mut self) {
+        for at in 0..self.pending.len() {
+            let slot = self.pending[at];
+            if self.flags[slot as usize] & DIRTY != 0 {
+                self.ranked(slot);
+            }
+        }
+        let levelled = self.levels.last().map_or(0, |end| *end as usize);
+        self.stale |= self.by_rank.len() > 2 * levelled + 64;
+    }
+
+    /// The end of the level that a rank lies in; none for nodes that came after the last numbering.
+    pub(crate) fn level_end(&self, rank: usize) -> Option<usize> {
+        let level = self.levels.partition_point(|end| *end as usize <= rank);
+        self.levels.get(level).map(|end| *end as usize)
+    }
+
+    /// The nodes that wait for their turn and come before a rank, in order.
+    pub(crate) fn waiting_below(&self, end: usize) -> impl Iterator<Item = u32> {
+        let mut from = 0;
+        std::iter::from_fn(move || {
+            let rank = self.queue.next_from(from).filter(|rank| *rank < end)?;
+            from = rank + 1;
+            Some(self.by_rank[rank])
+        })
     }
 
     /// Starts a frame: all that wait get a place in the queue.
@@ -175,7 +222,7 @@ impl Schedule {
     }
 
     /// Replaces the order; every node that waits in this frame must have a place in it.
-    pub(crate) fn set_order(&mut self, order: Vec<u32>) {
+    pub(crate) fn set_order(&mut self, order: Vec<u32>, levels: Vec<u32>) {
         let waiting: Vec<u32> = std::iter::from_fn(|| self.queue.pop_lowest()).map(|rank| self.by_rank[rank]).collect();
         for slot in std::mem::replace(&mut self.by_rank, order) {
             if slot != NO_RANK {
@@ -190,7 +237,7 @@ impl Schedule {
             let rank = self.ranked(slot);
             self.queue.insert(rank as usize);
         }
-        (self.stale, self.holes) = (false, 0);
+        (self.stale, self.holes, self.levels) = (false, 0, levels);
     }
 
     /// True if the node will have a turn in this frame.

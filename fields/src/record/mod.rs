@@ -1,0 +1,5 @@
+//! Recording and replay of a session at the level of fields.
+
+mod journal;
+
+pub(crate) use journal::{Event, Journal};
