@@ -60,7 +60,8 @@ fn a_coarse_map_is_seen_to_be_worse() {
 fn our_worlds_agree_with_the_tracer() {
     // World, light, view, worst disagreement in percent, worst IoU.
     let rows = [
-        ("market", "lamp_west", "eye_level", 0.1, 0.98),
+        // Leaves that are cut out by alpha throw the shadow of whole cards by volume.
+        ("market", "lamp_west", "eye_level", 0.5, 0.98),
         ("market", "sun", "overview", 1.5, 0.90),
         ("two_methods", "by_volume", "front", 0.02, 0.99),
         ("two_methods", "by_map", "front", 0.2, 0.97),
