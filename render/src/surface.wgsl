@@ -56,7 +56,7 @@ struct Place {
     is_receiver: bool,
 };
 
-fn place(f: Fragment, front: bool) -> Place {
+fn place(f: Fragment) -> Place {
     var s: Place;
     s.base_color = base_color_at(f.uv0, f.uv1, f.color);
     s.emissive = material.emissive;
@@ -92,10 +92,12 @@ fn place(f: Fragment, front: bool) -> Place {
     if dot(s.face_normal, s.towards_eye) < 0.0 {
         s.face_normal = -s.face_normal;
     }
+    // The side that is seen, whatever the winding says: real models have triangles that turn against their normals.
+    let side = select(-1.0, 1.0, dot(n, s.face_normal) >= 0.0);
     if material.textures[2].present != 0u {
         n = bumped(f, n, across, down);
     }
-    s.normal = select(-n, n, front);
+    s.normal = side * n;
     s.is_receiver = (f.flags & RECEIVES_SHADOW) != 0u;
     return s;
 }
@@ -178,15 +180,15 @@ fn base(f: Fragment, s: Place) -> vec3<f32> {
 
 // Opaque surfaces: ambient and emitted light, and the view's lights.
 @fragment
-fn opaque(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
-    let s = place(f, front);
+fn opaque(f: Fragment) -> @location(0) vec4<f32> {
+    let s = place(f);
     return vec4<f32>(base(f, s), 1.0);
 }
 
 // The same with holes.
 @fragment
-fn masked(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
-    let s = place(f, front);
+fn masked(f: Fragment) -> @location(0) vec4<f32> {
+    let s = place(f);
     if s.base_color.a < material.alpha_cutoff {
         discard;
     }
@@ -195,16 +197,16 @@ fn masked(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<
 
 // Mixed over what is behind: premultiplied.
 @fragment
-fn blended(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
-    let s = place(f, front);
+fn blended(f: Fragment) -> @location(0) vec4<f32> {
+    let s = place(f);
     let alpha = saturate(s.base_color.a);
     return vec4<f32>(base(f, s) * alpha, alpha);
 }
 
 // The view's lights alone, to be added to what is there.
 @fragment
-fn added(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
-    let s = place(f, front);
+fn added(f: Fragment) -> @location(0) vec4<f32> {
+    let s = place(f);
     if s.is_unlit || (material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff) {
         discard;
     }
@@ -213,8 +215,8 @@ fn added(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f
 
 // Share of one light that a map lets through. Cone, distance and orientation do not count.
 @fragment
-fn visibility(f: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
-    let s = place(f, front);
+fn visibility(f: Fragment) -> @location(0) vec4<f32> {
+    let s = place(f);
     if material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff {
         discard;
     }
