@@ -240,6 +240,12 @@ impl Schedule {
         (self.stale, self.holes, self.levels) = (false, 0, levels);
     }
 
+    /// Takes an order with its holes from a snapshot, between frames.
+    pub(crate) fn restore_order(&mut self, by_rank: Vec<u32>) {
+        self.queue.reserve(by_rank.len());
+        self.by_rank = by_rank;
+    }
+
     /// True if the node will have a turn in this frame.
     pub(crate) fn waits(&self, slot: u32) -> bool {
         let rank = self.turns[slot as usize].rank;
