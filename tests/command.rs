@@ -1,6 +1,6 @@
 //! The command line: what it prints, and what it says of bad input. One bad thing costs no more than itself.
 
-use crate::support::umbriel;
+use crate::support::{root, umbriel};
 use std::path::{Path, PathBuf};
 
 fn folder(name: &str) -> PathBuf {
@@ -144,6 +144,19 @@ fn wrong_words_on_the_command_line() {
 fn an_unknown_view_names_the_views_that_there_are() {
     let (run, _) = draw("views", "world.add(make(\"Viewpoint\", #{ name: \"tower\" }));", &["--view", "towre"]);
     assert!(!run.ok && run.stderr.contains("tower"), "{}", run.stderr);
+}
+
+#[test]
+fn a_world_is_opened_from_its_own_folder() {
+    let folder = folder("bare");
+    std::fs::copy(root().join("scripts/worlds/models/lamp.glb"), folder.join("lamp.glb")).expect("a model can be copied");
+    std::fs::write(folder.join("bare.rhai"), "world.add(load(\"lamp.glb\"));").expect("a world can be written");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_umbriel"))
+        .args(["run", "bare.rhai", "--headless", "--size", "32x32"])
+        .current_dir(&folder)
+        .output()
+        .expect("the command can be started");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]

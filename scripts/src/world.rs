@@ -177,7 +177,9 @@ fn problem_of(error: ScriptError, path: &Path) -> Problem {
 
 fn load(path: &Path, settings: &Settings) -> Result<(Graph, Script), ScriptError> {
     let source = Source::read(path, settings.limits.text)?;
-    let (mut graph, mut script) = empty(settings, path.parent());
+    // The parent of a bare file name is empty, which no system call takes for the current folder.
+    let folder = path.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
+    let (mut graph, mut script) = empty(settings, folder);
     run(&mut graph, &mut script, source)?;
     Ok((graph, script))
 }
