@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 use super::blocks::{Place, Seen};
-use super::numbers::{Numbers, mode_number};
+use super::numbers::Numbers;
 use crate::{Changes, FieldId, Graph, NodeId, Revision};
 
 /// Values of no more bytes are kept as they are: a quaternion is.
@@ -15,7 +15,7 @@ const SHORT: usize = 16;
 /// A node's share of the sum.
 #[derive(Default)]
 struct Shares {
-    /// Its type, name and mode.
+    /// Its type and name.
     own: u64,
     /// By field index; zero where no field is.
     fields: Vec<u64>,
@@ -79,7 +79,7 @@ impl Hashes {
         let node = &graph.nodes[id];
         let number = numbers.nodes.number(id);
         let name = node.name.as_deref().unwrap_or_default();
-        let own = xxh3_64_with_seed(name.as_bytes(), number ^ (mode_number(node.mode) as u64) << 62);
+        let own = xxh3_64_with_seed(name.as_bytes(), !number);
         shares.own = own ^ xxh3_64_with_seed(node.node_type.name.as_bytes(), number);
         shares.fields.resize(node.slots.len(), 0);
         let mut alive = vec![false; node.slots.len()];
@@ -105,7 +105,7 @@ impl Hashes {
         self.sum = self.sum.wrapping_sub(before).wrapping_add(shares.sum());
     }
 
-    /// The hash of all values, names, types, modes, and of how many routes there are.
+    /// The hash of all values, names and types, and of how many routes there are.
     pub(super) fn hash(&self, graph: &Graph) -> u64 {
         self.sum ^ (graph.routes.all.len() as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
     }

@@ -1,7 +1,7 @@
 //! Writes bytes: magic, version, checksum, then sections of records, each with its length, so that a later minor version may add to them.
 
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::xxh3_64;
+use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use super::outline::{Outline, dynamic_fields, own_mode, routes, waiting, written_fields};
 use crate::codec::{PlainField, to_bytes};
@@ -62,6 +62,11 @@ pub(super) struct ImageRecord {
     pub(super) rgba: Vec<u8>,
 }
 
+/// Of the body, and of the version that it was written as.
+pub(super) fn checksum(major: u16, minor: u16, body: &[u8]) -> u64 {
+    xxh3_64_with_seed(body, (major as u64) << 16 | minor as u64)
+}
+
 pub(super) fn write(graph: &Graph) -> Vec<u8> {
     let mut outline = Outline::new(graph, false);
     let nodes: Vec<_> = outline.nodes.clone().into_iter().map(|id| node(graph, id, &mut outline)).collect();
@@ -95,7 +100,7 @@ pub(super) fn write(graph: &Graph) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend(super::MAJOR.to_le_bytes());
     bytes.extend(super::MINOR.to_le_bytes());
-    bytes.extend(xxh3_64(&body).to_le_bytes());
+    bytes.extend(checksum(super::MAJOR, super::MINOR, &body).to_le_bytes());
     bytes.extend(body);
     bytes
 }

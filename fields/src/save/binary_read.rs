@@ -1,11 +1,10 @@
 //! Reads bytes. Nothing is believed: lengths are checked against what is there before anything is made of them.
 
 use serde::de::DeserializeOwned;
-use xxhash_rust::xxh3::xxh3_64;
 
 use super::SaveError;
 use super::binary::{
-    DataRecord, HEAD, IMAGES, ImageRecord, MAGIC, NODES, NodeRecord, ROUTES, RouteRecord, WAITING, WaitingRecord,
+    DataRecord, HEAD, IMAGES, ImageRecord, MAGIC, NODES, NodeRecord, ROUTES, RouteRecord, WAITING, WaitingRecord, checksum,
 };
 use super::parsed::{Data, Parsed, ParsedField, ParsedNode, ParsedRoute, ParsedWaiting, image};
 use crate::codec::Ref;
@@ -25,7 +24,7 @@ pub(super) fn read(data: &[u8]) -> Result<Parsed<'static>, SaveError> {
     if major != super::MAJOR {
         return Err(SaveError::WrongVersion { major, minor });
     }
-    if xxh3_64(body).to_le_bytes() != head[12..] {
+    if checksum(major, minor, body).to_le_bytes() != head[12..] {
         return Err(damaged("the checksum does not fit; bytes are missing or changed"));
     }
     let mut parsed = Parsed::default();

@@ -1,6 +1,6 @@
 //! From what a file says to nodes in a graph.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use super::parsed::{Data, Parsed, ParsedField, ParsedNode, ParsedRoute};
@@ -310,12 +310,14 @@ impl Graph {
     /// Nothing that happened to these nodes is news any more: no evaluation, no call and no route follows from it.
     pub(crate) fn rest(&mut self, nodes: &[NodeId]) {
         let last = self.changes.last();
-        for id in nodes.iter().filter(|id| self.nodes.contains_key(**id)) {
-            let slot = slot_of(*id) as usize;
-            self.schedule.flags[slot] &= !DIRTY;
-            let turn = &mut self.schedule.turns[slot];
+        let slots: HashSet<u32> = nodes.iter().filter(|id| self.nodes.contains_key(**id)).map(|id| slot_of(*id)).collect();
+        for slot in &slots {
+            self.schedule.flags[*slot as usize] &= !DIRTY;
+            let turn = &mut self.schedule.turns[*slot as usize];
             (turn.propagated, turn.evaluated) = (last, last);
         }
+        // The order in which they will wait is that in which they ask from now on.
+        self.schedule.pending.retain(|slot| !slots.contains(slot));
         self.note(|| Event::Rested(nodes.to_vec()));
     }
 

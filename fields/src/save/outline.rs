@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::codec::{Name, Ref};
 use crate::graph::slot_of;
 use crate::propagate::Carried;
+use crate::schedule::{DIRTY, EVALUATES, ROUTED};
 use crate::{Evaluator, Field, FieldId, Graph, Image, Mode, NodeId, Route, Same, Value};
 
 /// Nodes, images and their numbers, from one.
@@ -71,6 +72,12 @@ impl Name for Outline {
 pub(super) fn written_fields(graph: &Graph, id: NodeId) -> Vec<(&Field, Value)> {
     let count = graph.type_of(id).fields.len();
     let values = graph.field_ids(id).take(count).filter_map(|(field, declared)| Some((declared, graph.value(field).ok()?)));
+    // A node that does not exist any more loads as none, so it is none.
+    let alive = |value| match value {
+        Value::Node(Some(node)) if !graph.contains(node) => Value::Node(None),
+        value => value,
+    };
+    let values = values.map(|(declared, value)| (declared, alive(value)));
     values.filter(|(declared, value)| !value.same(&declared.default)).collect()
 }
 
@@ -128,7 +135,9 @@ pub(super) fn waiting(graph: &Graph) -> Vec<(NodeId, Option<&Field>)> {
         news.into_iter().map(|(_, field)| (field.node, graph.nodes[field.node].field(field.index))).collect();
     for slot in &graph.schedule.pending {
         let id = graph.ids[*slot as usize];
-        let waits = graph.schedule.flags[*slot as usize] & crate::schedule::DIRTY != 0;
+        let flags = graph.schedule.flags[*slot as usize];
+        // Whoever waited only for an observer, or for routes that are gone, has nothing to do.
+        let waits = flags & DIRTY != 0 && flags & (EVALUATES | ROUTED) != 0;
         let listed = told.contains(&id) || waiting.iter().any(|(other, field)| *other == id && field.is_none());
         if waits && !listed {
             waiting.push((id, None));

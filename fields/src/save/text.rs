@@ -55,7 +55,7 @@ fn write_node(text: &mut String, graph: &Graph, id: NodeId, outline: &mut Outlin
     let name = quoted(outline.id(id));
     let _ = write!(text, "        (\n            id: {name}, type: {}", quoted(&graph.type_of(id).name));
     // A name that looks like a number of an unnamed node.
-    if let Some(name) = graph.name(id).filter(|name| *name != outline.id(id)) {
+    if let Some(name) = graph.name(id).filter(|name| name.starts_with('#')) {
         let _ = write!(text, ", name: {}", quoted(name));
     }
     if let Some(mode) = own_mode(graph, id) {

@@ -165,7 +165,8 @@ fn a_later_minor_version_of_the_binary_form_opens() {
     body.splice(17 + record as usize..17 + record as usize, [7, 7]);
     body.extend([99, 3, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3]);
     let later = |major: u16, minor: u16| {
-        let checksum = xxhash_rust::xxh3::xxh3_64(&body).to_le_bytes();
+        let version = (major as u64) << 16 | minor as u64;
+        let checksum = xxhash_rust::xxh3::xxh3_64_with_seed(&body, version).to_le_bytes();
         [&bytes[..8], &major.to_le_bytes(), &minor.to_le_bytes(), &checksum, &body].concat()
     };
     let (graph, reports) = save::load(later(1, 4), types()).unwrap();

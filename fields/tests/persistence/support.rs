@@ -62,7 +62,8 @@ pub(crate) fn described(graph: &Graph, order: &[NodeId]) -> Vec<String> {
             if dynamic {
                 let default = shown(graph, order, field, &field.default);
                 let Field { field_type, doc, unit, range, aliases, on_set, choices, output, .. } = field;
-                line += &format!(" {field_type} {default} {doc:?} {unit:?} {range:?} {aliases:?} {on_set:?} {choices:?} {output}");
+                line +=
+                    &format!(" {field_type} {default} {doc:?} {unit:?} {range:?} {aliases:?} {on_set:?} {choices:?} {output}");
             }
             lines.push(line);
         }

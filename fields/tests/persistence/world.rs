@@ -17,8 +17,8 @@ fn connect(graph: &mut Graph, from: (NodeId, &str), to: (NodeId, &str), strength
 fn small_world() -> (Graph, Vec<NodeId>) {
     let mut graph = Graph::new(types());
     let names = ["world", "path", "#4 \"quoted\".x\0", "sum"];
-    let [world, path, odd, sum] =
-        [("All", names[0]), ("PositionInterpolator", names[1]), ("All", names[2]), ("Adder", names[3])].map(|(node_type, name)| {
+    let [world, path, odd, sum] = [("All", names[0]), ("PositionInterpolator", names[1]), ("All", names[2]), ("Adder", names[3])]
+        .map(|(node_type, name)| {
             let node = graph.create(node_type).unwrap();
             graph.set_name(node, name).unwrap();
             node
