@@ -10,20 +10,21 @@ use crossbeam::deque::{Injector, Steal};
 
 use crate::changes::{ChangeLog, Revision};
 use crate::column::Columns;
-use crate::evaluation::{Evaluation, Store, Write};
+use crate::evaluation::{Evaluation, Store};
 use crate::frame::Problem;
 use crate::graph::{Node, slot_of};
+use crate::kept::Kept;
 use crate::schedule::{EVALUATES, Schedule};
-use crate::{Evaluator, FieldId, Graph, NodeId, NodeType, Value};
+use crate::{Evaluator, FieldId, Graph, NodeId, NodeType};
 
 /// Starting threads and collecting what they did takes about this long, so less work is done sooner by one.
 const PAYS_FROM_NS: f32 = 150_000.0;
 /// What an evaluation of a type that was never measured is taken for.
 const GUESS_NS: f32 = 100.0;
 /// One in so many evaluations is measured.
-const MEASURED: usize = 16;
+const MEASURED: usize = 256;
 /// Work is handed out in pieces of about this long.
-const PIECE_NS: f32 = 20_000.0;
+const PIECE_NS: f32 = 50_000.0;
 
 /// What an evaluation ahead of its turn came to.
 #[derive(Debug)]
@@ -43,7 +44,7 @@ struct Piece {
     number: usize,
     slots: Vec<u32>,
     outcomes: Vec<Outcome>,
-    writes: Vec<Write>,
+    writes: Kept,
     problems: Vec<Problem>,
     /// How far the turns are.
     next: usize,
@@ -84,8 +85,8 @@ impl Ahead {
         }
     }
 
-    fn cost(&self, node_type: &Arc<NodeType>) -> f32 {
-        self.costs.get(&(Arc::as_ptr(node_type) as usize)).copied().unwrap_or(GUESS_NS)
+    fn cost(&self, node_type: &Arc<NodeType>) -> Option<f32> {
+        self.costs.get(&(Arc::as_ptr(node_type) as usize)).copied()
     }
 }
 
@@ -181,6 +182,7 @@ impl Graph {
         let queue = Injector::new();
         let (mut total, mut in_piece) = (0.0, 0.0);
         let mut last_type: Option<(&Arc<NodeType>, f32)> = None;
+        let mut unknown = false;
         let mut pieces = Vec::new();
         let mut piece = self.ahead.spare.pop().unwrap_or_default();
         for slot in self.schedule.waiting_below(end) {
@@ -191,7 +193,10 @@ impl Graph {
             let cost = match last_type {
                 Some((known, cost)) if Arc::ptr_eq(known, node_type) => cost,
                 _ if !matches!(node_type.evaluator, Evaluator::Native(_)) => continue,
-                _ => self.ahead.cost(node_type),
+                _ => self.ahead.cost(node_type).unwrap_or_else(|| {
+                    unknown = true;
+                    GUESS_NS
+                }),
             };
             last_type = Some((node_type, cost));
             piece.slots.push(slot);
@@ -204,6 +209,9 @@ impl Graph {
         }
         piece.number = pieces.len();
         pieces.push(piece);
+        if unknown {
+            self.ahead.since_measured = MEASURED;
+        }
         if total < PAYS_FROM_NS {
             self.ahead.pieces = pieces;
             self.ahead.drop_pieces();
@@ -225,12 +233,14 @@ impl Graph {
         }
         let before = place.checked_sub(1).map(|before| &piece.outcomes[before]);
         let (writes_start, problems_start) = before.map_or((0, 0), |before| (before.writes_end, before.problems_end));
-        for write in &mut piece.writes[writes_start..outcome.writes_end] {
+        for write in writes_start..outcome.writes_end {
             let revision = self.changes.next();
-            self.columns.write(write.slot, std::mem::replace(&mut write.value, Value::Bool(false)), false, revision);
+            piece.writes.write(write, &mut self.columns, revision);
             self.changes.wrote(slot, revision);
         }
-        self.frame.report.problems.extend_from_slice(&piece.problems[problems_start..outcome.problems_end]);
+        if problems_start < outcome.problems_end {
+            self.frame.report.problems.extend_from_slice(&piece.problems[problems_start..outcome.problems_end]);
+        }
         if outcome.again {
             self.schedule.again(slot);
         }

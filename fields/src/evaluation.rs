@@ -6,24 +6,16 @@ use crate::changes::{ChangeLog, Revision};
 use crate::column::Columns;
 use crate::frame::Problem;
 use crate::graph::Node;
+use crate::kept::Kept;
 use crate::kind::for_each_kind;
-use crate::{Field, FieldId, FieldValue, NodeId, SetRule, Value};
+use crate::{Field, FieldId, FieldType, FieldValue, NodeId, SetRule, Value};
 
 /// Where an evaluation reads and writes.
 pub(crate) enum Store<'a> {
     /// The graph itself.
     Now { columns: &'a mut Columns, changes: &'a mut ChangeLog },
     /// The graph as it is before the node's turn; writes are kept for that.
-    Ahead { columns: &'a Columns, writes: &'a mut Vec<Write>, first: usize },
-}
-
-/// A write for later.
-#[derive(Debug)]
-pub(crate) struct Write {
-    pub(crate) index: u16,
-    /// The place in the column of the value's type.
-    pub(crate) slot: u32,
-    pub(crate) value: Value,
+    Ahead { columns: &'a Columns, writes: &'a mut Kept, first: usize },
 }
 
 impl Store<'_> {
@@ -35,22 +27,39 @@ impl Store<'_> {
         }
     }
 
-    /// What this evaluation wrote into a field, if that waits.
+    /// True if this evaluation wrote the field, and that waits.
     #[inline]
-    fn kept(&self, index: u16) -> Option<&Value> {
+    fn keeps(&self, index: u16) -> bool {
         match self {
-            Store::Now { .. } => None,
-            Store::Ahead { writes, first, .. } => {
-                writes[*first..].iter().rev().find(|write| write.index == index).map(|write| &write.value)
-            }
+            Store::Now { .. } => false,
+            Store::Ahead { writes, first, .. } => writes.last(*first, index).is_some(),
         }
+    }
+
+    /// The value of a field of this type.
+    #[inline]
+    fn get<T: FieldValue>(&self, index: u16, slot: u32) -> T {
+        if let Store::Ahead { writes, first, .. } = self
+            && let Some(value) = writes.last(*first, index).and_then(|write| writes.get::<T>(write))
+        {
+            return value.clone();
+        }
+        T::column(self.columns()).values[slot as usize].clone()
+    }
+
+    fn value(&self, index: u16, field_type: FieldType, slot: u32) -> Value {
+        if let Store::Ahead { writes, first, .. } = self
+            && let Some(write) = writes.last(*first, index)
+        {
+            return writes.value(write);
+        }
+        self.columns().value(field_type, slot)
     }
 
     /// Writes now, or keeps the write if it would change anything.
     #[inline]
     fn write<T: FieldValue>(&mut self, place: (u32, u16, u32), value: T, compare: bool) {
         let (node, index, slot) = place;
-        let same = compare && self.kept(index).and_then(T::from_value).is_some_and(|kept| kept.same(&value));
         match self {
             Store::Now { columns, changes } => {
                 let revision = changes.last() + 1;
@@ -60,10 +69,10 @@ impl Store<'_> {
                 }
             }
             Store::Ahead { columns, writes, first } => {
-                let first_write = !writes[*first..].iter().any(|write| write.index == index);
-                let same = same || compare && first_write && T::column(columns).values[slot as usize].same(&value);
-                if !same {
-                    writes.push(Write { index, slot, value: value.into() });
+                let kept = writes.last(*first, index).and_then(|write| writes.get::<T>(write));
+                let now = kept.unwrap_or_else(|| &T::column(columns).values[slot as usize]);
+                if !compare || !now.same(&value) {
+                    writes.push(index, slot, value);
                 }
             }
         }
@@ -115,11 +124,10 @@ impl Evaluation<'_> {
     pub fn get<T: FieldValue>(&mut self, index: u16) -> T {
         if let Some(field) = self.node.field(index) {
             let slot = self.node.slots[index as usize];
-            let kept = self.store.kept(index);
-            if field.field_type == T::TYPE && kept.is_none() {
-                return T::column(self.store.columns()).values[slot as usize].clone();
+            if field.field_type == T::TYPE {
+                return self.store.get(index, slot);
             }
-            let value = kept.cloned().unwrap_or_else(|| self.store.columns().value(field.field_type, slot));
+            let value = self.store.value(index, field.field_type, slot);
             if let Some(value) = value.convert(T::TYPE).as_ref().and_then(T::from_value) {
                 return value;
             }
@@ -151,14 +159,14 @@ impl Evaluation<'_> {
     pub fn changed(&self, index: u16) -> bool {
         let Some(field) = self.node.field(index) else { return false };
         let revision = self.store.columns().revisions(field.field_type)[self.node.slots[index as usize] as usize];
-        self.store.kept(index).is_some()
+        self.store.keeps(index)
             || revision > self.evaluated && self.silenced.get(&FieldId { node: self.id, index }) != Some(&revision)
     }
 
     /// True if the field was ever written, since the node was created.
     pub fn written(&self, index: u16) -> bool {
         let Some(field) = self.node.field(index) else { return false };
-        self.store.kept(index).is_some()
+        self.store.keeps(index)
             || self.store.columns().revisions(field.field_type)[self.node.slots[index as usize] as usize] > self.node.created
     }
 

@@ -135,7 +135,7 @@ impl Graph {
         let Ok(value) = self.value(field) else { return };
         let revision = self.field_revision(field);
         // What happens between frames takes effect in the next.
-        let frame = self.frame.number + !self.schedule.running as u64;
+        let frame = self.frame.number + !self.frame.begun as u64;
         let time_s = self.frame.time_s;
         let Some(explain) = &mut self.explain else { return };
         explain.made += 1;

@@ -62,6 +62,8 @@ pub(crate) struct FrameState {
     pub(crate) report: FrameReport,
     /// Counts the calls of `evaluate`.
     pub(crate) number: u64,
+    /// From the first delivery of a frame to its last turn.
+    pub(crate) begun: bool,
 }
 
 impl FrameState {
@@ -96,6 +98,7 @@ impl Graph {
     }
 
     fn run_frame(&mut self, host: &mut dyn Host) {
+        self.frame.begun = true;
         self.deliver_carried();
         for slot in &self.frame.always {
             self.schedule.mark(*slot);
@@ -107,6 +110,7 @@ impl Graph {
             self.turn(slot, host);
         }
         self.ahead.end_frame();
+        self.frame.begun = false;
         self.schedule.running = false;
         self.frame.asked.clear();
     }

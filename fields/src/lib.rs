@@ -29,6 +29,7 @@ mod field;
 mod frame;
 mod graph;
 mod invariants;
+mod kept;
 mod kind;
 mod names;
 mod naming;

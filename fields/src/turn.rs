@@ -23,14 +23,14 @@ impl Graph {
     #[inline]
     pub(crate) fn run_evaluator(&mut self, id: NodeId, host: &mut dyn Host) -> bool {
         let slot = slot_of(id);
+        if self.ahead.threads > 1 && self.take_from_ahead(id) {
+            self.schedule.turns[slot as usize].evaluated = self.changes.last();
+            return true;
+        }
         match &self.nodes[id].node_type.evaluator {
             Evaluator::None => {}
             Evaluator::Native(_) if self.ahead.threads <= 1 => self.evaluate_native(id),
-            Evaluator::Native(_) => {
-                if !self.take_from_ahead(id) {
-                    self.evaluate_measured(id);
-                }
-            }
+            Evaluator::Native(_) => self.evaluate_measured(id),
             Evaluator::Host => {
                 self.note(|| Event::HostEvaluates(id));
                 host.evaluate(self, id);

@@ -2,6 +2,9 @@
 
 mod behaviours;
 mod chaos;
+mod copies;
 mod declarations;
+mod explain;
 mod model;
 mod support;
+mod threads;

@@ -1,0 +1,153 @@
+//! The number of threads changes nothing: the same values and revisions after every frame.
+
+use umbriel_fields::{Evaluation, Field, FieldId, Graph, Host, NoHost, NodeId, NodeType, SetRule, Strength, Value};
+
+use crate::support::{Random, frame};
+
+/// Mixes what it is given so that any difference spreads; at least so heavy that threads pay for a few of them.
+fn mix(evaluation: &mut Evaluation<'_>) {
+    let [a, b, state] = [0, 1, 2].map(|index| evaluation.get::<i64>(index));
+    let mut mixed = a.wrapping_mul(31).wrapping_add(b).wrapping_add(state.rotate_left(7));
+    for _ in 0..20_000 {
+        mixed = std::hint::black_box(mixed ^ (mixed << 13) ^ ((mixed as u64) >> 7) as i64);
+    }
+    mixed =
+        mixed.wrapping_add(evaluation.changed(0) as i64 + 2 * evaluation.changed(1) as i64 + (evaluation.time() * 60.0) as i64);
+    evaluation.set(2, mixed);
+    let own: i64 = evaluation.get(2);
+    evaluation.set(3, own % 3);
+    evaluation.set(3, own % 5);
+    evaluation.set(4, (own % 1000) as f64);
+    let few: i64 = evaluation.get(3);
+    evaluation.set(5, evaluation.changed(3) && few % 2 == 0);
+    if own % 7 == 0 {
+        evaluation.again();
+    }
+    if own % 11 == 0 {
+        evaluation.report(format!("{own}"));
+    }
+}
+
+fn mixers() -> Vec<NodeType> {
+    let fields = |node_type: NodeType| {
+        node_type
+            .field(Field::new("a", 0i64))
+            .field(Field::new("b", 0i64).on_set(SetRule::Pulse))
+            .field(Field::new("state", 1i64))
+            .field(Field::new("few", 0i64))
+            .field(Field::new("ranged", 0.0f64).range(-100.0, 100.0))
+            .field(Field::new("flag", false))
+    };
+    vec![
+        fields(NodeType::new("Mix", "Evaluated by a function.")).evaluate(mix),
+        fields(NodeType::new("Script", "Evaluated by the host.")).host_evaluated(),
+        fields(NodeType::new("Plain", "Not evaluated.")),
+    ]
+}
+
+/// Writes into other nodes too, so that what was evaluated ahead is void.
+struct Meddler {
+    random: Random,
+    nodes: Vec<NodeId>,
+}
+
+impl Host for Meddler {
+    fn evaluate(&mut self, graph: &mut Graph, node: NodeId) {
+        let value: i64 = graph.get(FieldId { node, index: 0 }).unwrap();
+        graph.set(FieldId { node, index: 3 }, value % 100).unwrap();
+        let other = self.random.pick(&self.nodes).unwrap();
+        match self.random.below(4) {
+            0 => graph.set(FieldId { node: other, index: 0 }, value).unwrap(),
+            1 => graph.touch(FieldId { node: other, index: 1 }).unwrap(),
+            2 => graph.set_silent(FieldId { node: other, index: 0 }, value).unwrap(),
+            _ => graph
+                .set_mode(other, self.random.pick(&[umbriel_fields::Mode::OnChange, umbriel_fields::Mode::Pull]).unwrap())
+                .unwrap(),
+        }
+    }
+}
+
+/// One number for all values and revisions of a graph (FNV-1a).
+fn hash(graph: &Graph) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325u64;
+    let mut add = |bits: u64| hash = (hash ^ bits).wrapping_mul(0x0000_0100_0000_01b3);
+    for node in graph.nodes() {
+        for (field, _) in graph.field_ids(node) {
+            add(graph.field_revision(field));
+            match graph.value(field).unwrap() {
+                Value::I64(value) => add(value as u64),
+                Value::F64(value) => add(value.to_bits()),
+                Value::Bool(value) => add(value as u64),
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+    hash
+}
+
+/// The hashes of the frames of a random session, and what the frames reported.
+fn session(seed: u64, threads: usize) -> Vec<(u64, umbriel_fields::FrameReport)> {
+    let mut random = Random(seed);
+    let mut graph = Graph::new(mixers());
+    graph.set_threads(threads);
+    let kinds = ["Mix", "Mix", "Mix", "Plain", "Script"];
+    let nodes: Vec<NodeId> = (0..120).map(|_| graph.create(random.pick(&kinds).unwrap()).unwrap()).collect();
+    for _ in 0..150 {
+        let [from, to] = [(); 2].map(|()| FieldId { node: random.pick(&nodes).unwrap(), index: random.below(4) as u16 });
+        let strength = if random.below(5) == 0 { Strength::Weak } else { Strength::Strong };
+        // Loops and doubles are refused, which is as good.
+        let _ = graph.connect(from, to, strength);
+    }
+    let mut host = Meddler { random: Random(seed + 1), nodes: nodes.clone() };
+    (0..12)
+        .map(|number| {
+            for _ in 0..random.below(60) {
+                let field = FieldId { node: random.pick(&nodes).unwrap(), index: random.below(4) as u16 };
+                graph.set(field, random.below(1000) as i64).unwrap();
+            }
+            let report = graph.evaluate(number as f64 / 60.0, &mut host);
+            graph.verify_invariants().unwrap();
+            (hash(&graph), report)
+        })
+        .collect()
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let mut different = std::collections::HashSet::new();
+    for seed in 0..6 {
+        let serial = session(seed, 1);
+        for threads in [2, 3, 8] {
+            assert_eq!(session(seed, threads), serial, "seed {seed}, {threads} threads");
+        }
+        different.extend(serial.into_iter().map(|(hash, _)| hash));
+    }
+    assert!(different.len() > 60, "the sessions are alike: {} frames", different.len());
+}
+
+#[test]
+fn independent_nodes_are_evaluated_on_several_threads() {
+    use std::collections::HashSet;
+    use std::sync::{Arc, Mutex};
+    let seen: Arc<Mutex<HashSet<std::thread::ThreadId>>> = Arc::default();
+    let noted = seen.clone();
+    let node_type = NodeType::new("Slow", "Takes its time.").field(Field::new("x", 0i64)).evaluate(move |_| {
+        noted.lock().unwrap().insert(std::thread::current().id());
+        std::thread::sleep(std::time::Duration::from_micros(300));
+    });
+    for threads in [1, 4] {
+        let mut graph = Graph::new(vec![node_type.clone()]);
+        graph.set_threads(threads);
+        let nodes: Vec<NodeId> = (0..600).map(|_| graph.create("Slow").unwrap()).collect();
+        for round in 1..3 {
+            seen.lock().unwrap().clear();
+            for node in &nodes {
+                graph.set_named(*node, "x", round).unwrap();
+            }
+            assert_eq!(graph.evaluate(0.0, &mut NoHost).evaluated, 600);
+        }
+        // The first frame measures, the second knows.
+        assert_eq!(seen.lock().unwrap().len(), threads, "of {threads}");
+        assert_eq!(frame(&mut graph).evaluated, 0, "idle frames stay idle");
+    }
+}
