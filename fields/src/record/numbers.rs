@@ -36,7 +36,7 @@ impl<K: Copy + Eq + std::hash::Hash> Pairs<K> {
     }
 
     pub(super) fn bind(&mut self, number: u64, key: K) {
-        self.next = self.next.max(number + 1);
+        self.next = self.next.max(number.saturating_add(1));
         self.numbers.insert(key, number);
         self.keys.insert(number, key);
     }
@@ -70,7 +70,7 @@ pub(super) struct Numbers {
     pub(super) known_blobs: Vec<Vec<u8>>,
     pub(super) definitions: Vec<Definition>,
     /// Stands for fields that may not exist any more: enums go by number.
-    any: Field,
+    any: Arc<Field>,
 }
 
 impl Numbers {
@@ -86,7 +86,7 @@ impl Numbers {
             known_images: Vec::new(),
             known_blobs: Vec::new(),
             definitions: Vec::new(),
-            any: Field::new("any", false),
+            any: Arc::new(Field::new("any", false)),
         }
     }
 

@@ -35,7 +35,9 @@ impl Playback<'_> {
                 EventRecord::Told(..) | EventRecord::HostEvaluates(_) => self.skip_call(graph),
                 event => {
                     if let Err(fault) = self.apply(event, graph) {
-                        self.fail(fault);
+                        let what = format!("{event:?}");
+                        let what = what.split(|letter: char| !letter.is_alphabetic()).next().unwrap_or_default();
+                        self.fail(format!("`{what}` cannot be done again: {fault}"));
                     }
                 }
             }

@@ -156,7 +156,11 @@ impl Replayer {
             let field = FieldId { node: self.numbers.nodes.keys.get(&place.0).copied().unwrap_or_default(), index: place.1 };
             let now = seen_now(graph, field, &mut self.numbers);
             if now.as_ref() != Some(seen) {
-                self.name_field(&mut divergence, graph, field, Some(seen));
+                if graph.contains(field.node) {
+                    self.name_field(&mut divergence, graph, field, Some(seen));
+                } else if divergence.message.is_empty() {
+                    divergence.message = format!("field {} of node {} was written; there is no such node now", place.1, place.0);
+                }
                 return divergence;
             }
         }

@@ -15,7 +15,7 @@ use crate::graph::{Node, slot_of};
 use crate::observe::Observer;
 use crate::propagate::Carried;
 use crate::route::{Arrival, Route};
-use crate::schedule::Turn;
+use crate::schedule::{NO_RANK, Turn};
 use crate::{FieldId, Graph, NodeId, RouteId, Same, Strength};
 
 #[derive(Serialize, Deserialize)]
@@ -264,6 +264,7 @@ pub(super) fn restore(
     restore_routes(&mut graph, state, numbers)?;
     for observer in &state.observers {
         let field = field_at(observer.field, numbers);
+        graph.declaration(field).map_err(|error| damaged(error.to_string()))?;
         let id = graph.observers.all.insert(Observer { field, token: observer.token, seen: observer.seen });
         graph.observers.by_slot.entry(slot_of(field.node)).or_default().push(id);
         numbers.observers.bind(observer.number, id);
@@ -292,17 +293,29 @@ fn check(state: &StateRecord) -> Result<(), RecordError> {
     let inside = |slot: &u32| (1..slots).contains(&(*slot as usize));
     let mut taken: Vec<u32> = state.nodes.iter().map(|node| node.slot).chain(state.free.iter().copied()).collect();
     taken.sort_unstable();
+    let turns_fit = turns_fit(state);
     let all = taken.iter().copied().eq(1..slots.max(1) as u32);
     let ordered = state.nodes.is_sorted_by(|a, b| a.slot < b.slot);
     let fit = state.turns.len() == slots && state.node_revisions.len() == slots;
-    let ranks = state.by_rank.iter().all(|slot| *slot == crate::schedule::NO_RANK || inside(slot));
-    let turns = state.turns.iter().all(|turn| turn.3 == crate::schedule::NO_RANK || (turn.3 as usize) < state.by_rank.len());
     let waits = state.pending.iter().chain(&state.always).chain(&state.asked).all(inside);
-    if all && ordered && fit && ranks && turns && waits {
+    // Numbers that only go up must have room to.
+    let counts = [state.revision, state.routes_made, state.schedule_frame].into_iter().all(|count| count < u64::MAX / 2);
+    let empty = state.free.iter().chain(&[0]).all(|slot| state.flags.get(*slot as usize).is_none_or(|flags| *flags == 0));
+    if all && ordered && fit && turns_fit && waits && counts && empty {
         Ok(())
     } else {
         Err(damaged("the places in a keyframe contradict each other"))
     }
+}
+
+/// Ranks and places in the order are each other's inverse.
+fn turns_fit(state: &StateRecord) -> bool {
+    let rank_of = |slot: usize| state.turns.get(slot).map(|turn| turn.3);
+    let ranks = state.by_rank.iter().enumerate();
+    let mut ranks = ranks.filter(|(_, slot)| **slot != NO_RANK);
+    let mut turns = state.turns.iter().enumerate().filter(|(_, turn)| turn.3 != NO_RANK);
+    ranks.all(|(rank, slot)| rank_of(*slot as usize) == Some(rank as u32))
+        && turns.all(|(slot, turn)| state.by_rank.get(turn.3 as usize) == Some(&(slot as u32)))
 }
 
 fn field_at(place: Place, numbers: &Numbers) -> FieldId {
@@ -342,6 +355,10 @@ fn restore_routes(graph: &mut Graph, state: &StateRecord, numbers: &mut Numbers)
         let (from, to) = (field_at(route.from, numbers), field_at(route.to, numbers));
         if graph.declaration(from).is_err() || graph.declaration(to).is_err() {
             return Err(damaged("a route between fields that do not exist"));
+        }
+        let unranked = |field: FieldId| state.turns[slot_of(field.node) as usize].3 == NO_RANK;
+        if !route.weak && (unranked(from) || unranked(to)) {
+            return Err(damaged("a strong route between nodes without a place in the order"));
         }
         let strength = if route.weak { Strength::Weak } else { Strength::Strong };
         let (from_place, to_place) = route.places;

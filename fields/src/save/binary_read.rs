@@ -32,7 +32,7 @@ pub(super) fn read(data: &[u8]) -> Result<Parsed<'static>, SaveError> {
     while let Some((tag, rest)) = body.split_first() {
         let (section, rest) = cut(rest)?;
         match *tag {
-            NODES => each(section, &mut parsed, |parsed, record| node(parsed, record))?,
+            NODES => each(section, &mut parsed, node)?,
             ROUTES => each(section, &mut parsed, |parsed, record| parsed.routes.push(route(record)))?,
             WAITING => {
                 parsed.waiting.get_or_insert_default();

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use glam::{Quat, Vec3};
 use umbriel_fields::record::{Options, RecordError, Recorder, Replayer, summary};
+use umbriel_fields::save::{self, TakenNames};
 use umbriel_fields::{Field, FieldId, Graph, Host, NoHost, NodeId, NodeType, Strength, TypeRegistry};
 
 use crate::support::{all_types, native_types, play};
@@ -76,7 +77,7 @@ fn somebody_who_meddles_with_a_replay_is_found_out() {
                 let hand = graph.find("hand").unwrap();
                 graph.delete(hand).unwrap();
             },
-            "frame 8: `(removed)` of a deleted node was [160, 1], is now the node does not exist any more; the node does not exist any more",
+            "frame 8: `Wrote` cannot be done again: the node does not exist any more",
         ),
         (
             |graph| {
@@ -168,6 +169,57 @@ fn types_that_are_missing_or_changed_are_named() {
         "the type `Inc` is not what it was when this was recorded: field `out` (i64) is now `out` (i32), or has another default, range or \
          choices"
     );
+}
+
+#[test]
+fn loading_a_file_is_part_of_a_session() {
+    let mut world = Graph::new(all_types());
+    let (sum, back) = (named(&mut world, "Inc", "inc"), named(&mut world, "Plain", "back"));
+    connect(&mut world, (sum, "out"), (back, "x"), Strength::Strong);
+    connect(&mut world, (back, "x"), (sum, "in"), Strength::Weak);
+    (0..5).for_each(|frame| drop(world.evaluate(frame as f64, &mut NoHost)));
+    let file = save::to_text(&world);
+    let mut graph = Graph::new(all_types());
+    let mut recorder = Recorder::new(&mut graph, Vec::new(), Options::default()).unwrap();
+    for frame in 0..12 {
+        if frame % 3 == 2 {
+            save::load_into(&mut graph, &file, TakenNames::Number).unwrap();
+        }
+        graph.evaluate(frame as f64, &mut NoHost);
+        recorder.frame(&mut graph).unwrap();
+    }
+    let bytes = recorder.finish(&mut graph).unwrap();
+    let (mut replayer, mut replayed) = Replayer::open(&bytes[..], native_types(1)).unwrap();
+    assert_eq!(play(&mut replayer, &mut replayed), None);
+    let value = |graph: &Graph, name| graph.get_named::<i64>(graph.find(name).unwrap(), "out").unwrap();
+    assert_eq!(value(&replayed, "inc"), value(&graph, "inc"));
+    assert!(value(&graph, "inc") > value(&world, "inc") + 5, "what was on its way in the file goes on");
+    assert_eq!((replayed.node_count(), replayed.revision()), (8, graph.revision()));
+}
+
+#[test]
+fn the_number_of_threads_does_not_matter() {
+    let mut graph = Graph::new(all_types());
+    graph.set_threads(3);
+    let [hand, all] = [("Plain", "hand"), ("Plain", "all")].map(|(kind, name)| named(&mut graph, kind, name));
+    for _ in 0..3000 {
+        let inc = graph.create("Inc").unwrap();
+        connect(&mut graph, (hand, "x"), (inc, "in"), Strength::Strong);
+        connect(&mut graph, (inc, "out"), (all, "x"), Strength::Strong);
+    }
+    let mut recorder = Recorder::new(&mut graph, Vec::new(), Options::default()).unwrap();
+    for frame in 0..20i64 {
+        graph.set_named(hand, "x", frame).unwrap();
+        graph.evaluate(frame as f64, &mut NoHost);
+        recorder.frame(&mut graph).unwrap();
+    }
+    let bytes = recorder.finish(&mut graph).unwrap();
+    for threads in [1, 2, 5] {
+        let (mut replayer, mut replayed) = Replayer::open(&bytes[..], native_types(1)).unwrap();
+        replayed.set_threads(threads);
+        assert_eq!(play(&mut replayer, &mut replayed), None);
+        assert_eq!(replayed.revision(), graph.revision(), "{threads} threads");
+    }
 }
 
 #[test]
