@@ -1,4 +1,4 @@
-//! The manual runs: every block of rhai in `docs/scripts.md` is a world, and its list of functions is the real one.
+//! The manual runs: every block of rhai in the README and in `docs/` is a world, and the list of functions is the real one.
 
 use std::path::{Path, PathBuf};
 
@@ -8,6 +8,16 @@ use crate::support;
 
 fn manual() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/scripts.md")
+}
+
+/// The README and every page of the manual, named from the root of the repository.
+fn pages() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let entries = std::fs::read_dir(root.join("docs")).expect("the manual's folder can be read");
+    let names = entries.map(|e| e.expect("its entries can be read").file_name().to_string_lossy().into_owned());
+    let pages = names.filter(|n| n.ends_with(".md")).map(|n| format!("docs/{n}"));
+    let read = |name: String| (std::fs::read_to_string(root.join(&name)).expect("a page can be read"), name);
+    pages.chain(["README.md".to_string()]).map(read).map(|(text, name)| (name, text)).collect()
 }
 
 /// The blocks, each moved down to its own lines, so that a problem's line is that of the manual.
@@ -28,13 +38,13 @@ fn blocks(text: &str) -> Vec<String> {
 /// A block may say what it reports: `// reports: text`.
 #[test]
 fn every_block_runs() {
-    let text = std::fs::read_to_string(manual()).expect("the manual");
-    let blocks = blocks(&text);
-    assert!(blocks.len() > 10, "only {} blocks", blocks.len());
-    for block in blocks {
+    let blocks: Vec<(String, String)> =
+        pages().iter().flat_map(|(name, text)| blocks(text).into_iter().map(|b| (name.clone(), b))).collect();
+    assert!(blocks.len() > 15, "only {} blocks", blocks.len());
+    for (page, block) in blocks {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("worlds");
         let settings = Settings { asset_folders: vec![folder], ..Settings::default() };
-        let mut world = World::load_source_with("docs/scripts.md", &block, settings).unwrap_or_else(|error| panic!("{error}"));
+        let mut world = World::load_source_with(&page, &block, settings).unwrap_or_else(|error| panic!("{error}"));
         (0..3).for_each(|frame| drop(world.step(f64::from(frame) / 60.0)));
         let problems = support::problems(&mut world);
         let announced: Vec<&str> = block.lines().filter_map(|line| Some(line.split_once("// reports: ")?.1)).collect();
