@@ -36,7 +36,7 @@ pub struct Field {
     pub on_set: SetRule,
     /// The names of an enum's values; empty for every other kind.
     pub choices: Arc<[Arc<str>]>,
-    /// Written by the node itself: not to be set by authors and not worth saving.
+    /// Written by the node itself: not to be set by authors. Saved all the same: it may be what the node remembers.
     pub output: bool,
 }
 

@@ -15,6 +15,7 @@ mod numbers;
 mod playback;
 mod recorder;
 mod replayer;
+mod restore;
 mod state;
 mod summary;
 mod types;

@@ -7,7 +7,7 @@ use super::hashes::{Changed, Hashes, seen_now};
 use super::numbers::Numbers;
 use super::playback::Playback;
 use super::types::Types;
-use super::{Divergence, RecordError, state};
+use super::{Divergence, RecordError, restore, state};
 use crate::{FieldId, Graph, TypeRegistry, Value};
 
 /// One frame that was replayed.
@@ -133,7 +133,7 @@ impl Replayer {
         }
         self.numbers.known_blobs = self.all(BlockKind::Blob)?;
         let state: state::StateRecord = self.blocks.decode(block)?;
-        let graph = state::restore(Graph::new(self.registry.clone()), &state, &mut self.types, &mut self.numbers)?;
+        let graph = restore::restore(Graph::new(self.registry.clone()), &state, &mut self.types, &mut self.numbers)?;
         self.hashes = Hashes::of(&graph, &mut self.numbers);
         if self.hashes.hash(&graph) != state.hash || state.frame != before {
             return Err(RecordError::Damaged { fault: format!("keyframe {before} does not have the values it had") });

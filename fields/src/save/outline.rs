@@ -1,13 +1,12 @@
 //! What of a graph goes into a save, and in which order.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use crate::codec::{Name, Ref};
 use crate::graph::slot_of;
-use crate::propagate::Carried;
 use crate::schedule::{DIRTY, EVALUATES, ROUTED};
-use crate::{Evaluator, Field, FieldId, Graph, Image, Mode, NodeId, Route, Same, Value};
+use crate::{Evaluator, Field, FieldId, Graph, Image, Mode, NodeId, Route, RouteId, Same, Value};
 
 /// Nodes, images and their numbers, from one.
 pub(super) struct Outline {
@@ -91,9 +90,9 @@ pub(super) fn dynamic_fields(graph: &Graph, id: NodeId) -> Vec<(&Field, Value)> 
 pub(super) fn routes(graph: &Graph) -> Vec<(Route, Option<&Value>)> {
     let mut routes: Vec<_> = graph.routes().map(|(id, route)| (id, *route)).collect();
     routes.sort_by_key(|(_, route)| route.ordinal);
-    let on_its_way =
-        |id| graph.frame.carried.iter().rev().find(|carried: &&Carried| carried.route == id).map(|carried| &carried.value);
-    routes.into_iter().map(|(id, route)| (route, on_its_way(id))).collect()
+    let on_its_way: HashMap<RouteId, &Value> =
+        graph.frame.carried.iter().map(|carried| (carried.route, &carried.value)).collect();
+    routes.into_iter().map(|(id, route)| (route, on_its_way.get(&id).copied())).collect()
 }
 
 /// The name of a mode that is not the type's own.
@@ -130,7 +129,7 @@ pub(super) fn waiting(graph: &Graph) -> Vec<(NodeId, Option<&Field>)> {
         }
     }
     news.sort_unstable();
-    let told: std::collections::HashSet<NodeId> = news.iter().map(|(_, field)| field.node).collect();
+    let mut listed: HashSet<NodeId> = news.iter().map(|(_, field)| field.node).collect();
     let mut waiting: Vec<_> =
         news.into_iter().map(|(_, field)| (field.node, graph.nodes[field.node].field(field.index))).collect();
     for slot in &graph.schedule.pending {
@@ -138,8 +137,7 @@ pub(super) fn waiting(graph: &Graph) -> Vec<(NodeId, Option<&Field>)> {
         let flags = graph.schedule.flags[*slot as usize];
         // Whoever waited only for an observer, or for routes that are gone, has nothing to do.
         let waits = flags & DIRTY != 0 && flags & (EVALUATES | ROUTED) != 0;
-        let listed = told.contains(&id) || waiting.iter().any(|(other, field)| *other == id && field.is_none());
-        if waits && !listed {
+        if waits && listed.insert(id) {
             waiting.push((id, None));
         }
     }

@@ -133,6 +133,47 @@ fn a_loaded_world_goes_on_as_the_saved_one() {
     }
 }
 
+/// Time and size in proportion to the world; printed for the record.
+#[test]
+fn a_large_world_is_saved_and_loaded_in_time() {
+    let mut graph = Graph::new(types());
+    let mut last = graph.create("All").unwrap();
+    for number in 0..10_000 {
+        let node = graph.create(if number % 2 == 0 { "Adder" } else { "All" }).unwrap();
+        graph.set_name(node, &format!("node {number}")).unwrap();
+        match number % 2 {
+            0 => connect(&mut graph, (last, "f64_one"), (node, "a"), Strength::Strong),
+            _ => {
+                graph.set_named(node, "vec3_one", Vec3::splat(number as f32 * 0.1)).unwrap();
+                connect(
+                    &mut graph,
+                    (last, "sum"),
+                    (node, "f64_one"),
+                    if number % 3 == 0 { Strength::Weak } else { Strength::Strong },
+                );
+            }
+        }
+        last = node;
+    }
+    let start = std::time::Instant::now();
+    let (text, text_s) = (save::to_text(&graph), start.elapsed().as_secs_f64());
+    let start = std::time::Instant::now();
+    let (binary, binary_s) = (save::to_binary(&graph), start.elapsed().as_secs_f64());
+    for (form, bytes, save_s) in [("text", text.as_bytes(), text_s), ("binary", &binary, binary_s)] {
+        let start = std::time::Instant::now();
+        let (loaded, reports) = save::load(bytes, types()).unwrap();
+        let load_s = start.elapsed().as_secs_f64();
+        println!(
+            "{form}: {} bytes a node, saved in {:.1} us a node, loaded in {:.1}",
+            bytes.len() / 10_001,
+            save_s * 100.0,
+            load_s * 100.0
+        );
+        assert_eq!((loaded.node_count(), reports.len()), (10_001, 0));
+        assert!(save_s < 10.0 && load_s < 10.0, "not in proportion: {save_s} s, {load_s} s");
+    }
+}
+
 #[test]
 fn names_that_are_taken_are_refused_or_numbered() {
     let (mut graph, order) = small_world();
