@@ -197,6 +197,29 @@ fn loading_a_file_is_part_of_a_session() {
     assert_eq!((replayed.node_count(), replayed.revision()), (8, graph.revision()));
 }
 
+/// A weak route's value that left before a strong one arrived, but was written later, wins in the next frame: who won is in keyframes.
+#[test]
+fn who_wrote_last_is_known_after_seeking() {
+    let mut graph = Graph::new(all_types());
+    let [early, strong, weak, to] = ["other", "strong", "weak", "to"].map(|name| named(&mut graph, "Plain", name));
+    connect(&mut graph, (weak, "x"), (early, "x"), Strength::Strong);
+    connect(&mut graph, (strong, "x"), (to, "x"), Strength::Strong);
+    connect(&mut graph, (weak, "x"), (to, "x"), Strength::Weak);
+    let mut recorder = Recorder::new(&mut graph, Vec::new(), Options { keyframe_every: 1 }).unwrap();
+    graph.set_named(strong, "x", 7).unwrap();
+    graph.set_named(weak, "x", 8).unwrap();
+    for (frame, expected) in [(1, 7), (2, 8), (3, 8)] {
+        graph.evaluate(frame as f64, &mut NoHost);
+        recorder.frame(&mut graph).unwrap();
+        assert_eq!(graph.get_named::<i64>(to, "x"), Ok(expected));
+    }
+    let bytes = recorder.finish(&mut graph).unwrap();
+    let (mut replayer, mut replayed) = Replayer::open(&bytes[..], native_types(1)).unwrap();
+    replayer.seek(&mut replayed, 3).unwrap();
+    replayer.seek(&mut replayed, 1).unwrap();
+    assert_eq!(play(&mut replayer, &mut replayed), None);
+}
+
 #[test]
 fn the_number_of_threads_does_not_matter() {
     let mut graph = Graph::new(all_types());
