@@ -136,7 +136,7 @@ fn write_images(text: &mut String, outline: &Outline) {
     }
     text.push_str("    images: [\n");
     for (place, image) in outline.images.iter().enumerate() {
-        let _ = write!(text, "        (id: \"image{}\", size: ({}, {}), rgba: [\n", place + 1, image.width, image.height);
+        let _ = writeln!(text, "        (id: \"image{}\", size: ({}, {}), rgba: [", place + 1, image.width, image.height);
         for bytes in image.rgba.chunks(PICTURE_WIDTH / 4 * 3) {
             let _ = writeln!(text, "            \"{}\",", base64::engine::general_purpose::STANDARD.encode(bytes));
         }

@@ -35,14 +35,14 @@ pub(crate) fn types() -> Vec<NodeType> {
 }
 
 /// Node references as places in the order of creation, the rest as it prints; NaN prints as NaN whatever its payload.
-fn shown(graph: &Graph, order: &[NodeId], field: &Field, value: &Value) -> String {
+fn shown(order: &[NodeId], field: &Field, value: &Value) -> String {
     let place = |node: &Option<NodeId>| node.and_then(|node| order.iter().position(|other| *other == node));
     match value {
         Value::Node(node) => format!("{:?}", place(node)),
         Value::Nodes(nodes) => format!("{:?}", nodes.iter().map(place).collect::<Vec<_>>()),
         Value::Image(Some(image)) => format!("{} x {}: {:?}", image.width, image.height, image.rgba),
         Value::Images(images) => {
-            let one = |image: &Option<_>| shown(graph, order, field, &Value::Image(image.clone()));
+            let one = |image: &Option<_>| shown(order, field, &Value::Image(image.clone()));
             format!("{:?}", images.iter().map(one).collect::<Vec<_>>())
         }
         Value::Enum(choice) => field.choice_name(*choice).unwrap_or("?").into(),
@@ -58,9 +58,9 @@ pub(crate) fn described(graph: &Graph, order: &[NodeId]) -> Vec<String> {
         for (number, (id, field)) in graph.field_ids(*node).enumerate() {
             let value = graph.value(id).unwrap();
             let dynamic = number >= graph.type_of(*node).fields.len();
-            let mut line = format!("{place}.{} = {}", field.name, shown(graph, order, field, &value));
+            let mut line = format!("{place}.{} = {}", field.name, shown(order, field, &value));
             if dynamic {
-                let default = shown(graph, order, field, &field.default);
+                let default = shown(order, field, &field.default);
                 let Field { field_type, doc, unit, range, aliases, on_set, choices, output, .. } = field;
                 line +=
                     &format!(" {field_type} {default} {doc:?} {unit:?} {range:?} {aliases:?} {on_set:?} {choices:?} {output}");

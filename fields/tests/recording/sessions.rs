@@ -276,7 +276,7 @@ fn a_frame_costs_what_changed() {
             graph.set_named(path, "key_value", [Vec3::ZERO, Vec3::ONE]).unwrap();
             connect(&mut graph, (clock, "fraction_changed"), (path, "set_fraction"), Strength::Strong);
         }
-        let mut run = |graph: &mut Graph, frame: i32| {
+        let run = |graph: &mut Graph, frame: i32| {
             if paths > 0 {
                 graph.set(position, Vec3::splat(frame as f32 * 0.37)).unwrap();
             }

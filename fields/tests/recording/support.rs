@@ -181,7 +181,7 @@ impl Host for Chaos {
 pub(crate) fn random_recording(seed: u64, before: usize, frames: usize, keyframe_every: u64) -> (Vec<u8>, Graph, usize) {
     let mut graph = Graph::new(all_types());
     let mut chaos = Chaos::new(seed);
-    let mut frame = |graph: &mut Graph, number: usize, chaos: &mut Chaos| {
+    let frame = |graph: &mut Graph, number: usize, chaos: &mut Chaos| {
         for _ in 0..chaos.random.below(9) {
             chaos.act(graph);
         }
