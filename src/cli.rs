@@ -28,6 +28,12 @@ pub(crate) enum Command {
     /// lit or shadowed in all sub-samples, the share where the renderer disagrees, and intersection over union of the
     /// shadow.
     ShadowError(ShadowError),
+    /// Plays a recording and compares every frame with what was recorded
+    ///
+    /// Exit status: 0 all frames are the same bit by bit, 2 they differ or the recording is cut off, 1 it cannot be played.
+    Replay(Replay),
+    /// Tells from a recording why a field holds what it holds
+    Explain(Explain),
     /// Prints the reference of node types
     Nodes(Nodes),
 }
@@ -54,9 +60,53 @@ pub(crate) struct Run {
     /// The display or viewpoint to show, by name
     #[arg(long)]
     pub(crate) view: Option<String>,
-    /// File to write; frames after the first get a number, displays after the first their name
+    /// File to write; where there are several frames or displays, their number and name are put before `.png`
     #[arg(long, requires = "headless")]
     pub(crate) out: Option<PathBuf>,
+    /// Record the session to this file, for `replay` and `explain`
+    #[arg(long)]
+    pub(crate) record: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Replay {
+    /// A recording
+    pub(crate) file: PathBuf,
+    /// Compare without a window
+    #[arg(long)]
+    pub(crate) headless: bool,
+    /// Begin after so many frames
+    #[arg(long, default_value_t = 0)]
+    pub(crate) seek: u64,
+    /// Draw every frame to a file, its number put before `.png`
+    #[arg(long, requires = "headless")]
+    pub(crate) out: Option<PathBuf>,
+    /// Pixels of each picture, such as 1280x720
+    #[arg(long, value_parser = size)]
+    pub(crate) size: Option<[u32; 2]>,
+    /// The display or viewpoint to show, by name
+    #[arg(long)]
+    pub(crate) view: Option<String>,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Explain {
+    /// A recording
+    pub(crate) file: PathBuf,
+    /// A node, by name or path; without one, what is in the recording is told
+    #[arg(requires = "field")]
+    pub(crate) node: Option<String>,
+    /// A field of the node
+    pub(crate) field: Option<String>,
+    /// After so many frames; otherwise at the end
+    #[arg(long)]
+    pub(crate) frame: Option<u64>,
+    /// The nodes that were evaluated, with counts and times
+    #[arg(long)]
+    pub(crate) costs: bool,
+    /// The graph in the language of Graphviz
+    #[arg(long, conflicts_with = "costs")]
+    pub(crate) dot: bool,
 }
 
 #[derive(Args, Debug)]

@@ -9,11 +9,15 @@ use umbriel_displays::WindowSizes;
 use umbriel_render::{Gpu, Renderer};
 use umbriel_scene::Picture;
 
-const DESKTOP_SIZE: [u32; 2] = [1280, 720];
+/// Pixels of a picture whose size nobody says.
+pub(crate) const DESKTOP_SIZE: [u32; 2] = [1280, 720];
 
 /// Draws the frames that were asked for. Gives the number of problems that were reported meanwhile.
 pub(crate) fn run(args: &Run) -> Result<usize, Box<dyn std::error::Error>> {
     let mut session = Session::open(&args.path)?;
+    if let Some(file) = &args.record {
+        session.record(file)?;
+    }
     let gpu = Gpu::new(None)?;
     let mut renderer = Renderer::new(&gpu)?;
     let device = describe(&gpu);
@@ -26,7 +30,7 @@ pub(crate) fn run(args: &Run) -> Result<usize, Box<dyn std::error::Error>> {
     }
     for frame in 0..args.frames {
         session.step(args.time + f64::from(frame) / args.fps);
-        let pictures = pictures(&mut session, args)?;
+        let pictures = pictures(&mut session, args.view.as_deref(), args.size)?;
         let stats = renderer.render(session.scene(), &pictures)?;
         tracing::debug!("frame {frame}: {stats:?}");
         for (place, picture) in pictures.iter().enumerate() {
@@ -43,17 +47,23 @@ pub(crate) fn run(args: &Run) -> Result<usize, Box<dyn std::error::Error>> {
         bar.inc(1);
     }
     bar.finish_and_clear();
+    if let Some(frames) = session.finish_recording()? {
+        println!("{frames} frames recorded");
+    }
     println!("{last} pictures, the last {}", bar.message());
     Ok(problems)
 }
 
-/// The pictures of the frame; `--size` is that of each of them.
-pub(crate) fn pictures(session: &mut Session, args: &Run) -> Result<Vec<Picture>, umbriel_displays::Error> {
-    let size = args.size.unwrap_or(DESKTOP_SIZE);
-    let natural = session.pictures(args.view.as_deref(), size, &WindowSizes::new())?;
-    let Some(size) = args.size else { return Ok(natural) };
+/// The pictures of the frame; `size` is that of each of them.
+pub(crate) fn pictures(
+    session: &mut Session,
+    view: Option<&str>,
+    size: Option<[u32; 2]>,
+) -> Result<Vec<Picture>, umbriel_displays::Error> {
+    let natural = session.pictures(view, size.unwrap_or(DESKTOP_SIZE), &WindowSizes::new())?;
+    let Some(size) = size else { return Ok(natural) };
     let windows: WindowSizes = natural.into_iter().map(|p| (p.name, size)).collect();
-    session.pictures(args.view.as_deref(), size, &windows)
+    session.pictures(view, size, &windows)
 }
 
 /// Name and driver of a device.
@@ -74,7 +84,7 @@ pub(crate) fn progress(length: u32, unit: &str) -> ProgressBar {
 }
 
 /// `out.png`, `out.wall.png`, `out.0007.png`, `out.wall.0007.png`.
-fn numbered(out: &Path, picture: Option<&str>, frame: Option<u32>) -> PathBuf {
+pub(crate) fn numbered(out: &Path, picture: Option<&str>, frame: Option<u32>) -> PathBuf {
     let mut name = out.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     for part in [picture.map(file_name), frame.map(|f| format!("{f:04}"))].into_iter().flatten() {
         name = format!("{name}.{part}");

@@ -5,9 +5,11 @@ mod headless;
 mod model;
 mod nodes;
 mod png;
+mod replay;
 mod scene_file;
 mod session;
 mod shadow_error;
+mod source;
 mod window;
 
 use clap::Parser;
@@ -32,6 +34,8 @@ fn main() -> ExitCode {
         Command::Run(args) if args.headless => headless::run(args),
         Command::Run(args) => window::run(args).map(|()| 0),
         Command::ShadowError(args) => shadow_error::run(args),
+        Command::Replay(args) => replay::run(args),
+        Command::Explain(args) => replay::explain(args).map(|text| print(&text)),
         Command::Nodes(args) => nodes::reference(args.name.as_deref()).map(|text| print(&text)).map_err(Into::into),
     };
     match result {

@@ -1,6 +1,7 @@
 //! A world or a model that is shown: the loop that sees all crates, up to the renderer.
 
 use crate::model;
+use crate::source::{Recording, RecordingError, Replay, Source};
 use glam::Vec3;
 use std::path::{Path, PathBuf};
 use umbriel_displays::WindowSizes;
@@ -23,12 +24,16 @@ pub(crate) enum OpenError {
     /// The model is wrong.
     #[error(transparent)]
     Model(#[from] model::Error),
+    /// The recording is wrong, or cannot be written.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
 }
 
 /// A running world with its flat scene.
 pub(crate) struct Session {
     path: PathBuf,
-    world: World,
+    source: Source,
+    recording: Option<Recording>,
     extractor: Extractor,
     scene: Scene,
     rig: Rig,
@@ -51,15 +56,21 @@ impl Session {
             }
             _ => return Err(OpenError::Kind(path.to_path_buf())),
         };
-        Ok(Session::of(world, path))
+        Ok(Session::of(Source::World(Box::new(world)), path))
     }
 
-    /// Shows a world that is there already; pictures that its nodes name lie beside `path`.
-    pub(crate) fn of(world: World, path: &Path) -> Session {
+    /// Shows a recording.
+    pub(crate) fn replay(replay: Replay, path: &Path) -> Session {
+        Session::of(Source::Replay(Box::new(replay)), path)
+    }
+
+    /// Pictures that nodes name lie beside `path`.
+    fn of(source: Source, path: &Path) -> Session {
         Session {
             path: path.to_path_buf(),
-            generation: world.generation(),
-            world,
+            generation: source.generation(),
+            source,
+            recording: None,
             extractor: extractor_beside(path),
             scene: Scene::default(),
             rig: Rig::new(),
@@ -68,25 +79,42 @@ impl Session {
         }
     }
 
+    /// Records every frame from now on.
+    pub(crate) fn record(&mut self, path: &Path) -> Result<(), OpenError> {
+        self.recording = Some(Recording::start(self.source.graph_mut(), path)?);
+        Ok(())
+    }
+
+    /// Ends the recording, if there is one; gives the number of its frames.
+    pub(crate) fn finish_recording(&mut self) -> Result<Option<u64>, OpenError> {
+        let Some(recording) = self.recording.take() else { return Ok(None) };
+        Ok(Some(recording.finish(self.source.graph_mut())?))
+    }
+
     /// Runs one frame of the world and brings the scene up to date.
     pub(crate) fn step(&mut self, time_s: f64) {
-        let report = self.world.step(time_s);
-        self.problems.extend(self.world.problems().iter().map(ToString::to_string));
-        let graph = self.world.graph();
-        let place = |p: &umbriel_fields::Problem| p.field.map_or_else(|| graph.describe(p.node), |f| graph.describe_field(f));
-        self.problems.extend(report.problems.iter().map(|p| format!("{}: {}", place(p), p.message)));
+        self.problems.extend(self.source.step(time_s));
+        if let Some(Err(error)) = self.recording.as_mut().map(|r| r.frame(self.source.graph_mut())) {
+            self.problems.push(format!("the recording ends here: {error}"));
+            self.recording = None;
+        }
         self.extract();
     }
 
+    /// Has a recording been played to its end?
+    pub(crate) fn is_over(&self) -> bool {
+        matches!(&self.source, Source::Replay(replay) if replay.is_over())
+    }
+
     fn extract(&mut self) {
-        if self.world.generation() != self.generation {
-            self.generation = self.world.generation();
+        if self.source.generation() != self.generation {
+            self.generation = self.source.generation();
             self.extractor = extractor_beside(&self.path);
             self.scene = Scene::default();
             self.navigation = None;
             self.rig.refit();
         }
-        self.extractor.update(self.world.graph(), &mut self.scene);
+        self.extractor.update(self.source.graph(), &mut self.scene);
         self.problems.extend(self.extractor.problems().iter().map(ToString::to_string));
     }
 
@@ -100,7 +128,7 @@ impl Session {
     ) -> Result<Vec<Picture>, umbriel_displays::Error> {
         let bounds = bounds(&self.scene).transformed(&self.extractor.world_from_room());
         let wanted = Wanted { view, size, windows };
-        let found = self.rig.pictures(self.world.graph(), self.extractor.viewpoints(), &bounds, &wanted)?;
+        let found = self.rig.pictures(self.source.graph(), self.extractor.viewpoints(), &bounds, &wanted)?;
         self.problems.extend(found.problems.iter().map(ToString::to_string));
         Ok(found.pictures)
     }
@@ -117,7 +145,7 @@ impl Session {
 
     /// The graph.
     pub(crate) fn graph(&self) -> &Graph {
-        self.world.graph()
+        self.source.graph()
     }
 
     /// The viewpoints of the world, in tree order.
@@ -139,7 +167,7 @@ impl Session {
 
     fn try_navigate(&mut self, input: Input<'_>) -> Result<(), umbriel_displays::Error> {
         let centre = bounds(&self.scene).transformed(&self.extractor.world_from_room()).centre();
-        let graph = self.world.graph_mut();
+        let graph = self.source.graph_mut();
         let node = match self.navigation {
             Some(node) if graph.contains(node.node) => node,
             _ => NavigationNode::find_or_create(graph, centre)?,
@@ -153,7 +181,7 @@ impl Session {
     /// Puts the room back to where it stands without navigation.
     pub(crate) fn reset_navigation(&mut self) {
         let Some(node) = self.navigation else { return };
-        let graph = self.world.graph_mut();
+        let graph = self.source.graph_mut();
         let result = node.read(graph).and_then(|mut navigator| {
             navigator.position = Vec3::ZERO;
             navigator.orientation = glam::Quat::IDENTITY;
@@ -162,26 +190,37 @@ impl Session {
         self.problems.extend(result.err().map(|e| e.to_string()));
     }
 
-    /// Reads the files again. Where they are wrong, that is reported and what was there stays.
+    /// Reads the files again. Where they are wrong, that is reported and what was there stays. A reloaded graph is another
+    /// one, so a recording ends.
     pub(crate) fn reload(&mut self) {
-        if self.path.extension().is_some_and(|e| e == "rhai") {
-            self.world.reload();
-            self.problems.extend(self.world.problems().iter().map(ToString::to_string));
-            return;
-        }
-        match Session::open(&self.path) {
-            Ok(fresh) => {
-                let problems = std::mem::take(&mut self.problems);
-                *self = Session { problems, ..fresh };
-            }
+        match self.finish_recording() {
+            Ok(Some(frames)) => self.problems.push(format!("reloaded: the recording ends after {frames} frames")),
+            Ok(None) => {}
             Err(error) => self.problems.push(error.to_string()),
+        }
+        match &mut self.source {
+            Source::World(world) if self.path.extension().is_some_and(|e| e == "rhai") => {
+                world.reload();
+                self.problems.extend(world.problems().iter().map(ToString::to_string));
+            }
+            Source::World(_) => match Session::open(&self.path) {
+                Ok(fresh) => {
+                    let problems = std::mem::take(&mut self.problems);
+                    *self = Session { problems, ..fresh };
+                }
+                Err(error) => self.problems.push(error.to_string()),
+            },
+            Source::Replay(replay) => self.problems.extend(replay.seek(0).err().map(|e| e.to_string())),
         }
     }
 
     /// The files that were read.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
-        let own = std::iter::once(self.path.clone());
-        own.chain(self.world.files().map(Path::to_path_buf).filter(|f| *f != self.path)).collect()
+        let mut files = vec![self.path.clone()];
+        if let Source::World(world) = &self.source {
+            files.extend(world.files().map(Path::to_path_buf).filter(|f| *f != self.path));
+        }
+        files
     }
 
     /// Name of the world: its file without folder and extension.

@@ -1,6 +1,7 @@
 //! Shows a world in windows.
 
-use crate::cli::Run;
+use crate::cli::{Replay, Run};
+use crate::headless::DESKTOP_SIZE;
 use crate::png;
 use crate::session::Session;
 use std::path::PathBuf;
@@ -9,15 +10,26 @@ use umbriel_displays::navigation::Input;
 use umbriel_displays::window::{self, App, Command, Frame, Options};
 use umbriel_render::RgbaPixels;
 
-const DESKTOP_SIZE: [u32; 2] = [1280, 720];
-
 /// Opens the windows and runs until they are closed.
 pub(crate) fn run(args: &Run) -> Result<(), Box<dyn std::error::Error>> {
-    let session = Session::open(&args.path)?;
-    let mut app = Viewer { session, view: args.view.clone(), size: args.size, watched: Vec::new() };
-    app.session.step(args.time);
-    app.session.pictures(app.view.as_deref(), DESKTOP_SIZE, &WindowSizes::new())?; // a wrong --view ends here
-    Ok(window::run(&mut app, Options { start_s: args.time, frames: None })?)
+    let mut session = Session::open(&args.path)?;
+    if let Some(file) = &args.record {
+        session.record(file)?;
+    }
+    session.step(args.time);
+    session.pictures(args.view.as_deref(), DESKTOP_SIZE, &WindowSizes::new())?; // a wrong --view ends here
+    let mut viewer = Viewer { session, view: args.view.clone(), size: args.size, watched: Vec::new() };
+    let shown = window::run(&mut viewer, Options { start_s: args.time, frames: None });
+    if let Some(frames) = viewer.session.finish_recording()? {
+        println!("{frames} frames recorded");
+    }
+    Ok(shown?)
+}
+
+/// Shows a recording; it stays at its last frame.
+pub(crate) fn replay(session: Session, args: &Replay) -> Result<(), Box<dyn std::error::Error>> {
+    let mut viewer = Viewer { session, view: args.view.clone(), size: args.size, watched: Vec::new() };
+    Ok(window::run(&mut viewer, Options::default())?)
 }
 
 struct Viewer {
@@ -48,7 +60,9 @@ impl Viewer {
 
 impl App for Viewer {
     fn frame(&mut self, time_s: f64, windows: &WindowSizes) -> Frame<'_> {
-        self.session.step(time_s);
+        if !self.session.is_over() {
+            self.session.step(time_s);
+        }
         let size = self.size.unwrap_or(DESKTOP_SIZE);
         let pictures = self.session.pictures(self.view.as_deref(), size, windows).or_else(|error| {
             // The named view went away with a reload.

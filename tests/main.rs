@@ -2,6 +2,7 @@
 
 mod command;
 mod layers;
+mod recording;
 mod shadows;
 mod support;
 mod views;
