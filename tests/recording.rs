@@ -54,7 +54,7 @@ fn a_session_is_replayed_bit_by_bit_and_explained() {
 #[test]
 fn damaged_recordings_are_told() {
     let bytes = std::fs::read(market("damaged", "4")).expect("the recording can be read");
-    let cut = &bytes[..bytes.len() * 99 / 100];
+    let cut = &bytes[..bytes.len() - 64];
     let mut version = bytes.clone();
     version[4..12].fill(0xff);
     let rows: [(&str, &[u8], &str); 4] = [
