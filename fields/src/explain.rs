@@ -47,6 +47,9 @@ pub enum By {
     },
 }
 
+/// What the host does, and the writes because of which it does.
+type During = Option<(By, Arc<[(FieldId, WriteId)]>)>;
+
 /// A write that was noted.
 #[derive(Clone, Debug)]
 pub(crate) struct Noted {
@@ -71,7 +74,7 @@ pub(crate) struct Explain {
     made: WriteId,
     origin: Option<Arc<str>>,
     /// What the host does at the moment, and because of what.
-    during: Option<(By, Arc<[(FieldId, WriteId)]>)>,
+    during: During,
     /// The source's write of what weak routes carry.
     carried: HashMap<RouteId, (FieldId, WriteId)>,
     pub(crate) times: HashMap<NodeId, Duration>,
@@ -212,11 +215,11 @@ impl Graph {
         self.leave(outer);
     }
 
-    fn enter(&mut self, by: By, from: Arc<[(FieldId, WriteId)]>) -> Option<(By, Arc<[(FieldId, WriteId)]>)> {
+    fn enter(&mut self, by: By, from: Arc<[(FieldId, WriteId)]>) -> During {
         self.explain.as_mut().and_then(|explain| explain.during.replace((by, from)))
     }
 
-    fn leave(&mut self, outer: Option<(By, Arc<[(FieldId, WriteId)]>)>) {
+    fn leave(&mut self, outer: During) {
         if let Some(explain) = &mut self.explain {
             explain.during = outer;
         }

@@ -2,12 +2,11 @@
 
 use std::collections::{BTreeSet, HashSet};
 
-use crate::evaluation::{Evaluation, Store};
 use crate::graph::slot_of;
 use crate::propagate::Carried;
 use crate::record::Event;
 use crate::schedule::{EVALUATES, IN_TURN, OBSERVED, ROUTED, SILENCED};
-use crate::{Error, Evaluator, FieldId, Graph, Mode, NodeId, Strength};
+use crate::{Error, FieldId, Graph, Mode, NodeId, Strength};
 
 /// What the graph asks for while a frame is evaluated. Everything is allowed in these calls but to evaluate the graph: what is created,
 /// connected or written for nodes that had their turn takes part from the next frame on.

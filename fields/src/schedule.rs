@@ -53,6 +53,7 @@ pub(crate) struct Schedule {
     pub(crate) pending: Vec<u32>,
     pub(crate) frame: u64,
     pub(crate) running: bool,
+    /// Ranks without a node, and nodes that came after the last numbering.
     pub(crate) holes: usize,
     /// Where the levels of the order end, by rank: nodes of a level have no strong routes between each other. Nodes that came later follow.
     pub(crate) levels: Vec<u32>,
@@ -144,8 +145,7 @@ impl Schedule {
                 self.ranked(slot);
             }
         }
-        let levelled = self.levels.last().map_or(0, |end| *end as usize);
-        self.stale |= self.by_rank.len() > 2 * levelled + 64;
+        self.stale |= self.is_disordered();
     }
 
     /// The end of the level that a rank lies in; none for nodes that came after the last numbering.
@@ -194,6 +194,7 @@ impl Schedule {
         if turn.rank == NO_RANK {
             turn.rank = self.by_rank.len() as u32;
             self.by_rank.push(slot);
+            self.holes += 1;
             self.queue.reserve(self.by_rank.len());
         }
         self.turns[slot as usize].rank
@@ -215,10 +216,14 @@ impl Schedule {
         }
     }
 
+    fn is_disordered(&self) -> bool {
+        self.holes > 64 && self.holes > self.by_rank.len() / 2
+    }
+
     /// Too many holes are a reason to number anew.
     fn made_hole(&mut self) {
         self.holes += 1;
-        self.stale |= self.holes > 64 && self.holes > self.by_rank.len() / 2;
+        self.stale |= self.is_disordered();
     }
 
     /// Replaces the order; every node that waits in this frame must have a place in it.

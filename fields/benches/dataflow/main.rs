@@ -9,9 +9,9 @@ mod support;
 mod threads;
 
 fn main() {
-    if std::env::var_os("T").is_some() {
-        threads::interpolators();
-        return;
+    // `-- threads` measures those alone.
+    if std::env::args().any(|arg| arg == "threads") {
+        return threads::all();
     }
     println!("{:<66} {:>10} {:>9} {:>6}", "nanoseconds", "umbriel", "arrays", "ratio");
     copies::chain(1000);
@@ -34,6 +34,6 @@ fn main() {
     println!("\n{:<66} {:>10}", "bytes", "umbriel");
     memory::nodes(100_000);
     memory::routes(100_000);
-    println!("\n{:<66} {:>10} {:>9} {:>6}", "nanoseconds per evaluation", "1 thread", "2 threads", "ratio");
-    threads::interpolators();
+    println!();
+    threads::all();
 }
