@@ -10,11 +10,10 @@ use rhai::packages::{
     ArithmeticPackage, BasicArrayPackage, BasicFnPackage, BasicIteratorPackage, BasicMapPackage, BasicMathPackage,
     BasicStringPackage, LogicPackage, MoreStringPackage, Package,
 };
-use rhai::{AST, Dynamic, Engine, EvalAltResult, FnPtr, Module, Position, Scope};
+use rhai::{AST, ASTNode, Dynamic, Engine, EvalAltResult, Expr, FnPtr, Module, Position, Scope, Stmt};
 
 use crate::error::{Fault, Known, Outcome, Problem, hint, problem_from};
 use crate::limits::Limits;
-use crate::property_names::PropertyNames;
 use crate::reference::FunctionDoc;
 use crate::source::Source;
 use crate::stage::{Handler, Node, Stage};
@@ -32,7 +31,6 @@ pub(crate) fn on_deep_stack<T>(work: impl FnOnce() -> T) -> T {
 pub(crate) struct Script {
     engine: Engine,
     pub(crate) stage: Rc<Stage>,
-    property_names: Rc<PropertyNames>,
     constants: Constants,
     docs: Vec<FunctionDoc>,
     /// What runs: the statements of the main script, all functions, those of the console too.
@@ -46,15 +44,14 @@ impl Script {
     /// An engine that works on a stage, without any text yet.
     pub(crate) fn new(stage: Rc<Stage>, world: Option<Node>) -> Self {
         let mut engine = Engine::new_raw();
-        let property_names = Rc::new(PropertyNames::default());
         let constants = Constants::default();
         take_packages(&mut engine);
         set_limits(&mut engine, &stage.limits);
-        set_hooks(&mut engine, &stage, &property_names, &constants);
+        set_hooks(&mut engine, &stage, &constants);
         set_constants(&mut engine, world);
         name_faults(&mut engine);
         let docs = words::teach(&mut engine, &stage);
-        Self { engine, stage, property_names, constants, docs, ast: AST::empty(), scope: Scope::new() }
+        Self { engine, stage, constants, docs, ast: AST::empty(), scope: Scope::new() }
     }
 
     /// Parses and runs the main script.
@@ -62,10 +59,9 @@ impl Script {
         *self.stage.source.borrow_mut() = Rc::new(source);
         let source = self.stage.source.borrow().clone();
         self.ast = self.compile(&source.text).map_err(|e| self.problem(&e))?;
-        let ast = std::mem::take(&mut self.ast);
-        let result = self.evaluate(&ast);
-        self.ast = ast;
-        result.map(drop)
+        self.functions_changed();
+        let ast = self.ast.clone();
+        self.evaluate(&ast).map(drop)
     }
 
     /// Runs one more text in the world that is there, with its variables; the value as text.
@@ -77,8 +73,11 @@ impl Script {
         let shifted = "\n".repeat(lines_before) + text;
         let new = self.compile(&shifted).map_err(|e| self.problem(&e))?;
         let ast = self.ast.clone_functions_only().merge(&new);
+        self.ast = ast.clone();
+        self.functions_changed();
+        self.stage.at_console.set(true);
         let result = self.evaluate(&ast);
-        self.ast = ast;
+        self.stage.at_console.set(false);
         let value = result?;
         if value.is_unit() {
             return Ok(String::new());
@@ -87,8 +86,24 @@ impl Script {
         self.guarded(self.stage.limits.handler, text).map(|text| text.to_string()).map_err(|error| self.problem(&error))
     }
 
+    /// Expressions call the functions of the world: those of now.
+    fn functions_changed(&self) {
+        *self.stage.functions.borrow_mut() = self.ast.clone_functions_only();
+        self.stage.compiled.borrow_mut().clear();
+    }
+
+    /// Runs what is no handler, but has a handler's time.
+    pub(crate) fn within_handler(&self, run: impl FnOnce(&Engine) -> Outcome<Dynamic>) -> Outcome<Dynamic> {
+        self.guarded(self.stage.limits.handler, || run(&self.engine))
+    }
+
+    /// The files that editors read; see [`crate::definitions`].
+    pub(crate) fn definitions(&self) -> Vec<(String, String)> {
+        self.engine.definitions().iter_files().collect()
+    }
+
     fn compile(&self, text: &str) -> Result<AST, Box<EvalAltResult>> {
-        self.property_names.begin();
+        self.stage.property_names.begin();
         let compiled = catch_unwind(AssertUnwindSafe(|| self.engine.compile(text)));
         compiled.map_err(|panic| broken(panic.as_ref()))?.map_err(Box::from)
     }
@@ -106,6 +121,7 @@ impl Script {
     /// Calls a function of the script, with as many of the values as it takes. A problem that knows no place of its own
     /// gets that of the handler.
     pub(crate) fn call(&self, handler: &Handler, mut values: Vec<Dynamic>) -> Result<Dynamic, Problem> {
+        self.stage.write(|graph| self.stage.set_origin(graph, handler.place));
         values.truncate(self.parameters(&handler.call).unwrap_or(values.len()));
         let call = || handler.call.call::<Dynamic>(&self.engine, &self.ast, values);
         self.guarded(self.stage.limits.handler, call).map_err(|error| {
@@ -144,6 +160,8 @@ impl Drop for Script {
             self.stage.on_frame.borrow_mut().clear();
             self.stage.on_change.borrow_mut().clear();
             self.stage.definitions.borrow_mut().clear();
+            self.stage.compiled.borrow_mut().clear();
+            self.stage.running_constants.borrow_mut().clear();
             self.constants.borrow_mut().clear();
             self.scope.clear();
         });
@@ -190,8 +208,8 @@ fn set_limits(engine: &mut Engine, limits: &Limits) {
         .set_max_strings_interned(1024);
 }
 
-fn set_hooks(engine: &mut Engine, stage: &Rc<Stage>, property_names: &Rc<PropertyNames>, constants: &Constants) {
-    let names = property_names.clone();
+fn set_hooks(engine: &mut Engine, stage: &Rc<Stage>, constants: &Constants) {
+    let names = stage.clone();
     engine.on_print(|text| tracing::info!(target: "umbriel::script", "{text}"));
     engine.on_debug(|text, _, position| tracing::debug!(target: "umbriel::script", "{position:?}: {text}"));
     let clock = stage.clone();
@@ -199,7 +217,7 @@ fn set_hooks(engine: &mut Engine, stage: &Rc<Stage>, property_names: &Rc<Propert
     let (stage, constants) = (stage.clone(), constants.clone());
     // rhai marks these two as likely to change between its versions, which it does with its word "deprecated".
     #[allow(deprecated)]
-    engine.on_parse_token(move |token, _, _| names.map(token));
+    engine.on_parse_token(move |token, _, _| names.property_names.map(token));
     #[allow(deprecated)]
     engine.on_var(move |name, index, context| {
         if let Some(reason) = stage.meter.weigh(context.call_level(), context.scope()) {
@@ -210,6 +228,7 @@ fn set_hooks(engine: &mut Engine, stage: &Rc<Stage>, property_names: &Rc<Propert
             return Ok(None);
         }
         let running = context.global_runtime_state().constants.as_ref().and_then(|c| c.borrow().get(name).cloned());
+        let running = running.or_else(|| stage.running_constants.borrow().get(name).cloned());
         Ok(running.or_else(|| constants.borrow().get(name).cloned()))
     });
 }
@@ -252,6 +271,20 @@ impl Known for Script {
         let functions: Vec<String> = self.ast.iter_functions().map(|f| f.name.to_string()).collect();
         let known = self.docs.iter().map(|doc| doc.name()).chain(functions.iter().map(String::as_str));
         format!("there is no function `{name}`{}", hint(name, known))
+    }
+
+    fn endless_loop(&self) -> Position {
+        let mut place = Position::NONE;
+        self.ast.walk(&mut |nodes: &[ASTNode<'_>]| match nodes.last() {
+            Some(ASTNode::Stmt(Stmt::While(parts, position)))
+                if parts.body.is_empty() && matches!(parts.expr, Expr::Unit(..) | Expr::BoolConstant(true, ..)) =>
+            {
+                place = *position;
+                false
+            }
+            _ => true,
+        });
+        place
     }
 
     fn no_variable(&self, name: &str) -> String {

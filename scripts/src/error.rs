@@ -65,6 +65,9 @@ impl fmt::Display for Problem {
             0 => write!(f, "{}: {}", self.file, self.message)?,
             _ => write!(f, "{}:{}:{}: {}", self.file, self.line, self.column, self.message)?,
         }
+        if let Some(field) = self.field.as_ref().filter(|f| !self.message.contains(f.as_str())) {
+            write!(f, " (field `{field}`)")?;
+        }
         if let Some(node) = self.node.as_ref().filter(|n| !self.message.contains(n.as_str())) {
             write!(f, " (node {node})")?;
         }
@@ -121,7 +124,11 @@ pub(crate) fn problem_from(error: &EvalAltResult, source: &Source, known: &dyn K
         calls.insert(0, if line == 0 { name.to_string() } else { format!("{name}, called in {file}:{line}") });
         (inner, place) = (deeper, *position);
     }
-    let position = inner.position().or_else(place);
+    let mut position = inner.position();
+    if position.is_none() && matches!(inner, EvalAltResult::ErrorTerminated(..)) {
+        position = known.endless_loop();
+    }
+    let position = position.or_else(place);
     let (file, line, column) = source.place(position);
     let fault = match inner {
         EvalAltResult::ErrorRuntime(thrown, _) => thrown_text(thrown),
@@ -134,7 +141,7 @@ pub(crate) fn problem_from(error: &EvalAltResult, source: &Source, known: &dyn K
     Problem { message: fault.message, file, line, column, node: fault.node, field: fault.field, calls }
 }
 
-fn thrown_text(thrown: &Dynamic) -> Fault {
+pub(crate) fn thrown_text(thrown: &Dynamic) -> Fault {
     match thrown.read_lock::<Fault>() {
         Some(fault) => fault.clone(),
         None => Fault::new(thrown.to_string()),
@@ -142,7 +149,7 @@ fn thrown_text(thrown: &Dynamic) -> Fault {
 }
 
 /// rhai ends its messages with the place in its own numbering; ours comes from the line table.
-fn text_without_place(error: &EvalAltResult) -> String {
+pub(crate) fn text_without_place(error: &EvalAltResult) -> String {
     let text = error.to_string();
     match (error.position().is_none(), text.rfind(" (line ")) {
         (false, Some(end)) => text[..end].to_string(),
@@ -150,10 +157,21 @@ fn text_without_place(error: &EvalAltResult) -> String {
     }
 }
 
+/// The error without the calls around it.
+pub(crate) fn inner_of(error: &EvalAltResult) -> &EvalAltResult {
+    let mut inner = error;
+    while let EvalAltResult::ErrorInFunctionCall(_, _, deeper, _) = inner {
+        inner = deeper;
+    }
+    inner
+}
+
 /// What names exist, for messages about names that do not.
 pub(crate) trait Known {
     /// A message for a call that matches no function; `signature` as rhai writes it, `name (type, type)`.
     fn no_function(&self, signature: &str) -> String;
+    /// The place of a loop that does nothing and never ends: there the engine knows no place of its own.
+    fn endless_loop(&self) -> Position;
     /// A message for a variable that does not exist.
     fn no_variable(&self, name: &str) -> String;
 }

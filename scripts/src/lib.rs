@@ -9,8 +9,11 @@
 //!
 //! This crate knows nothing of rendering, windows, displays, networks. It opens only files below the world's folder.
 
+mod definition;
 mod engine;
 mod error;
+mod expression;
+mod held;
 mod limits;
 mod property_names;
 mod random;
@@ -24,5 +27,5 @@ mod world;
 
 pub use error::{Problem, ScriptError};
 pub use limits::Limits;
-pub use reference::{FunctionDoc, functions};
+pub use reference::{FunctionDoc, definitions, functions};
 pub use world::{Settings, World};

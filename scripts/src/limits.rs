@@ -20,7 +20,7 @@ pub struct Limits {
     pub string_len: usize,
     /// Entries of one map, nested ones included.
     pub map_len: usize,
-    /// Bytes of all values that a script holds in its variables, about.
+    /// Bytes of all values that a script holds in its variables, about; and of all that its handlers hold together.
     pub memory: usize,
     /// Nodes in the graph.
     pub nodes: usize,
@@ -57,6 +57,8 @@ pub(crate) struct Meter {
     next_weighing: Cell<u64>,
     weighed: Cell<(Instant, Duration)>,
     scales: RefCell<Scales>,
+    /// Time that scripts took since all handlers were weighed, and how long that weighing took.
+    unweighed: Cell<(Duration, Duration)>,
 }
 
 /// Operations between two looks at the clock: about 10 us.
@@ -73,6 +75,7 @@ impl Meter {
             next_weighing: Cell::new(0),
             weighed: Cell::new((Instant::now(), Duration::ZERO)),
             scales: RefCell::new(Scales::new(memory)),
+            unweighed: Cell::default(),
         }
     }
 
@@ -83,7 +86,12 @@ impl Meter {
             self.deadline.set(Some((Instant::now() + time, time)));
             self.scales.borrow_mut().clear();
         }
+        let start = Instant::now();
         let result = work();
+        if outer.is_none() {
+            let (spent, took) = self.unweighed.get();
+            self.unweighed.set((spent + start.elapsed(), took));
+        }
         self.deadline.set(outer);
         result
     }
@@ -94,6 +102,17 @@ impl Meter {
         let result = work();
         self.deadline.set(self.deadline.get().map(|(end, time)| (end + start.elapsed(), time)));
         result
+    }
+
+    /// Whether scripts ran long enough since all handlers were weighed: growth takes time, and weighing a fifth of it at most.
+    pub(crate) fn handlers_are_due(&self) -> bool {
+        let (spent, took) = self.unweighed.get();
+        spent > (took * 4).max(Duration::from_millis(20))
+    }
+
+    /// All handlers were weighed, which took so long.
+    pub(crate) fn handlers_weighed(&self, took: Duration) {
+        self.unweighed.set((Duration::ZERO, took));
     }
 
     /// Called for every operation of a script; says why it must end, if it must.

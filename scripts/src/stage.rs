@@ -4,14 +4,19 @@ use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::PathBuf;
 use std::rc::Rc;
+use std::sync::Arc;
 
-use rhai::{Dynamic, FnPtr, Position};
+use rhai::{AST, Dynamic, FnPtr, ImmutableString, Position};
 use umbriel_fields::{EnumValue, Error, FieldId, FieldType, Graph, Kind, NodeId, ObserverId, Value};
 
+use crate::definition::{Behaviour, Definition};
 use crate::error::{Fault, Outcome, Problem, fail};
+use crate::expression::Compiled;
 use crate::limits::{Limits, Meter};
+use crate::property_names::PropertyNames;
 use crate::source::Source;
-use crate::values::{natural, to_dynamic, to_value};
+use crate::values::{to_dynamic, to_value};
+use crate::words::declare::declared;
 
 /// A node as scripts hold it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,13 +36,6 @@ pub(crate) struct OnChange {
     pub(crate) field: FieldId,
     pub(crate) observer: ObserverId,
     pub(crate) me: Option<Node>,
-}
-
-/// A node type that a script defined.
-#[derive(Clone, Default)]
-pub(crate) struct Definition {
-    pub(crate) evaluate: Option<Handler>,
-    pub(crate) changed: Vec<(String, Handler)>,
 }
 
 /// The name of an enum's value.
@@ -61,6 +59,32 @@ pub(crate) struct Stage {
     pub(crate) on_frame: RefCell<BTreeMap<u64, Handler>>,
     pub(crate) on_change: RefCell<BTreeMap<u64, OnChange>>,
     pub(crate) definitions: RefCell<HashMap<String, Definition>>,
+    /// Nodes of native types that a script's type extends.
+    pub(crate) behaviours: RefCell<HashMap<NodeId, Behaviour>>,
+    /// Those of them that are evaluated in every frame, in the order in which they were made.
+    pub(crate) always: RefCell<Vec<NodeId>>,
+    /// The nodes whose `evaluate` runs, with the type that it stands in, for `evaluate_base`.
+    pub(crate) evaluating: RefCell<Vec<(Node, String)>>,
+    /// Texts of Expressions, compiled.
+    pub(crate) compiled: RefCell<Compiled>,
+    /// How many texts were compiled.
+    pub(crate) compilations: Cell<u64>,
+    /// The functions of the world, for Expressions.
+    pub(crate) functions: RefCell<AST>,
+    pub(crate) property_names: PropertyNames,
+    /// The constants of the main script while it runs, for Expressions that it makes.
+    pub(crate) running_constants: RefCell<BTreeMap<ImmutableString, Dynamic>>,
+    /// Where Expressions were made.
+    pub(crate) made_at: RefCell<HashMap<NodeId, Position>>,
+    /// The text of an Expression that failed.
+    pub(crate) failed_code: RefCell<HashMap<NodeId, Arc<str>>>,
+    /// True while an Expression is computed: it sees its inputs only.
+    alone: Cell<bool>,
+    pub(crate) at_console: Cell<bool>,
+    /// What all handlers may hold together; more than the limit where switching one off did not free what it had gathered.
+    pub(crate) held_limit: Cell<usize>,
+    /// Counts the frames.
+    pub(crate) frame: Cell<u64>,
     /// Nodes of script-defined types whose evaluate failed.
     pub(crate) switched_off: RefCell<HashSet<NodeId>>,
     pub(crate) time_s: Cell<f64>,
@@ -74,7 +98,6 @@ impl Stage {
         Rc::new(Self {
             graph: RefCell::new(Graph::new(Vec::new())),
             meter: Meter::new(limits.memory),
-            limits,
             folders,
             problems: RefCell::default(),
             source: RefCell::default(),
@@ -82,6 +105,21 @@ impl Stage {
             on_frame: RefCell::default(),
             on_change: RefCell::default(),
             definitions: RefCell::default(),
+            behaviours: RefCell::default(),
+            always: RefCell::default(),
+            evaluating: RefCell::default(),
+            compiled: RefCell::default(),
+            compilations: Cell::new(0),
+            functions: RefCell::new(AST::empty()),
+            property_names: PropertyNames::default(),
+            running_constants: RefCell::default(),
+            made_at: RefCell::default(),
+            failed_code: RefCell::default(),
+            alone: Cell::new(false),
+            at_console: Cell::new(false),
+            held_limit: Cell::new(limits.memory),
+            limits,
+            frame: Cell::new(0),
             switched_off: RefCell::default(),
             time_s: Cell::new(0.0),
             next_handler: Cell::new(0),
@@ -106,24 +144,48 @@ impl Stage {
         work(&mut self.graph.borrow_mut())
     }
 
+    /// Computes an Expression, from which the world is out of reach.
+    pub(crate) fn alone<T>(&self, work: impl FnOnce() -> T) -> T {
+        let before = self.alone.replace(true);
+        let result = work();
+        self.alone.set(before);
+        result
+    }
+
+    /// Refuses what an Expression must not do.
+    pub(crate) fn may_change(&self) -> Outcome<()> {
+        match self.alone.get() {
+            true => fail("an expression sees its inputs only: it reads no other nodes and changes nothing"),
+            false => Ok(()),
+        }
+    }
+
+    /// Says where in the script the next writes come from, if anybody wants to know.
+    pub(crate) fn set_origin(&self, graph: &mut Graph, position: Position) {
+        if graph.explains() {
+            let (file, line, _) = self.source.borrow().place(position);
+            graph.set_origin(&if line == 0 { file } else { format!("{file}:{line}") });
+        }
+    }
+
     /// A new node, within the limit of nodes. A type that a script defined gets its handlers.
     pub(crate) fn create(&self, type_name: &str) -> Outcome<Node> {
+        self.may_change()?;
         if self.read(Graph::node_count) >= self.limits.nodes {
             return fail(format!("the world has {} nodes already, and more are not allowed", self.limits.nodes));
         }
-        let id = self.write(|graph| graph.create(type_name)).map_err(|e| Fault::new(e.to_string()))?;
-        let canonical = self.read(|graph| graph.type_of(id).name.to_string());
-        let changed = self.definitions.borrow().get(&canonical).map(|d| d.changed.clone()).unwrap_or_default();
-        for (field, handler) in changed {
-            self.observe(Node(id), &field, handler, Some(Node(id)))?;
-        }
-        Ok(Node(id))
+        self.create_defined(type_name)
     }
 
     pub(crate) fn delete(&self, node: Node) -> Outcome<()> {
+        self.may_change()?;
         let label = self.label(node);
         self.write(|graph| graph.delete(node.0)).map_err(|e| self.fault(e, &label, None))?;
         self.on_change.borrow_mut().retain(|_, handler| handler.field.node != node.0);
+        self.behaviours.borrow_mut().remove(&node.0);
+        self.made_at.borrow_mut().remove(&node.0);
+        self.failed_code.borrow_mut().remove(&node.0);
+        self.switched_off.borrow_mut().remove(&node.0);
         let mut bytes = self.field_bytes.borrow_mut();
         bytes.retain(|field, size| {
             let keep = field.node != node.0;
@@ -147,6 +209,7 @@ impl Stage {
     }
 
     pub(crate) fn field(&self, node: Node, name: &str) -> Outcome<FieldId> {
+        self.may_change()?;
         let found = self.read(|graph| graph.field(node.0, name));
         found.map_err(|e| self.fault(e, &self.label(node), Some(name)).into())
     }
@@ -158,10 +221,13 @@ impl Stage {
 
     /// The value of a field as scripts see it; `()` if the field is gone.
     pub(crate) fn value(&self, field: FieldId) -> Dynamic {
-        self.read(|graph| {
-            let Ok(value) = graph.value(field) else { return Dynamic::UNIT };
-            to_dynamic(&value, &|choice| choice_name(graph, field, choice))
-        })
+        self.read(|graph| self.value_in(graph, field))
+    }
+
+    /// The same from a graph that is not lent at the moment.
+    pub(crate) fn value_in(&self, graph: &Graph, field: FieldId) -> Dynamic {
+        let Ok(value) = graph.value(field) else { return Dynamic::UNIT };
+        to_dynamic(&value, &|choice| choice_name(graph, field, choice))
     }
 
     pub(crate) fn set(&self, node: Node, name: &str, given: &Dynamic) -> Outcome<()> {
@@ -204,13 +270,15 @@ impl Stage {
     }
 
     pub(crate) fn add_field(&self, node: Node, name: &str, default: &Dynamic) -> Outcome<()> {
-        let value = natural(default).map_err(|why| self.fault_at(node, name, format!("field `{name}`: {why}")))?;
-        let added = self.write(|graph| graph.add_field(node.0, umbriel_fields::Field::new(name, value)));
+        self.may_change()?;
+        let field = declared(name, default).map_err(|why| self.fault_at(node, name, format!("field `{name}`: {why}")))?;
+        let added = self.write(|graph| graph.add_field(node.0, field));
         added.map(drop).map_err(|e| self.fault(e, &self.label(node), Some(name)).into())
     }
 
     /// A place for one more handler.
     pub(crate) fn handler_id(&self) -> Outcome<u64> {
+        self.may_change()?;
         if self.on_frame.borrow().len() + self.on_change.borrow().len() >= self.limits.handlers {
             return fail(format!("the world has {} handlers already, and more are not allowed", self.limits.handlers));
         }

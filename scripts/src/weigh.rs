@@ -46,6 +46,15 @@ impl Scales {
     }
 }
 
+/// What values hold together, those that are shared counted once; too deep nesting weighs as much as can be.
+pub(crate) fn weight<'a>(values: impl IntoIterator<Item = &'a Dynamic>) -> usize {
+    let mut load = Load { bytes: 0, limit: usize::MAX, seen: HashSet::new() };
+    match values.into_iter().try_for_each(|value| load.add(value, 0)) {
+        Ok(()) => load.bytes,
+        Err(_) => usize::MAX,
+    }
+}
+
 enum Excess {
     Bytes,
     Depth,

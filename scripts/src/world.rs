@@ -1,6 +1,6 @@
 //! A world: the graph, and the script that made it and that it calls.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -8,8 +8,11 @@ use rhai::Dynamic;
 use umbriel_fields::{FieldId, FrameReport, Graph, Host, NodeId};
 use umbriel_scenegraph::new_graph;
 
+use crate::definition::BEHAVIOUR;
 use crate::engine::{Script, on_deep_stack};
 use crate::error::{Problem, ScriptError};
+use crate::expression::{self, EXPRESSION};
+use crate::held;
 use crate::limits::Limits;
 use crate::source::Source;
 use crate::stage::{Node, Stage};
@@ -33,6 +36,8 @@ pub struct World {
     files: BTreeSet<PathBuf>,
     time_s: Option<f64>,
     generation: u64,
+    /// What nodes reported already.
+    told: HashSet<(NodeId, String)>,
 }
 
 impl World {
@@ -69,8 +74,17 @@ impl World {
     }
 
     fn of(graph: Graph, script: Script, settings: Settings, path: Option<PathBuf>) -> Self {
-        let mut world =
-            Self { graph, script, settings, path, problems: Vec::new(), files: BTreeSet::new(), time_s: None, generation: 0 };
+        let mut world = Self {
+            graph,
+            script,
+            settings,
+            path,
+            problems: Vec::new(),
+            files: BTreeSet::new(),
+            time_s: None,
+            generation: 0,
+            told: HashSet::new(),
+        };
         world.collect();
         world
     }
@@ -86,17 +100,24 @@ impl World {
     }
 
     /// Runs one frame: the script's frame handlers, then the graph's evaluation with its handlers and node types.
+    /// Problems that nodes report are among [`World::problems`], each once; the report has none.
     /// Time in seconds; one that is no number, or that runs backwards, is taken for the last one.
     pub fn step(&mut self, time_s: f64) -> FrameReport {
         let last = self.time_s.unwrap_or(if time_s.is_finite() { time_s } else { 0.0 });
         let time_s = if time_s.is_finite() { time_s.max(last) } else { last };
         self.time_s = Some(time_s);
-        let report = on_deep_stack(|| {
+        let mut report = on_deep_stack(|| {
             self.script.stage.time_s.set(time_s);
+            self.script.stage.frame.set(self.script.stage.frame.get() + 1);
             call_on_frame(&mut self.graph, &self.script, time_s, time_s - last);
-            self.graph.evaluate(time_s, &mut Callbacks { script: &self.script, time_s })
+            self.graph.set_origin("");
+            self.script.stage.wake_always(&mut self.graph, time_s);
+            let report = self.graph.evaluate(time_s, &mut Callbacks { script: &self.script, time_s });
+            held::bound(&self.script.stage);
+            report
         });
         self.collect();
+        self.take_over(std::mem::take(&mut report.problems));
         report
     }
 
@@ -136,12 +157,29 @@ impl World {
                 self.script = script;
                 self.generation += 1;
                 self.files.clear();
+                self.told.clear();
                 self.collect();
                 true
             }
             Err(error) => {
                 self.problems.push(problem_of(error, &path));
                 false
+            }
+        }
+    }
+
+    /// Problems of nodes become problems of the world, each once, however often it is reported.
+    fn take_over(&mut self, problems: Vec<umbriel_fields::Problem>) {
+        const REMEMBERED: usize = 10_000;
+        let (file, _, _) = self.script.stage.source.borrow().place(rhai::Position::NONE);
+        for umbriel_fields::Problem { node, field, message } in problems {
+            let label = self.graph.contains(node).then(|| self.graph.describe(node));
+            let declared = field.and_then(|field| self.graph.declaration(field).ok()).map(|field| field.name.to_string());
+            if self.told.len() < REMEMBERED && self.told.insert((node, message.clone())) {
+                let place = self.script.stage.made_at.borrow().get(&node).copied();
+                let (file, line, column) =
+                    place.map_or((file.clone(), 0, 0), |place| self.script.stage.source.borrow().place(place));
+                self.problems.push(Problem { message, file, line, column, node: label, field: declared, calls: Vec::new() });
             }
         }
     }
@@ -186,9 +224,18 @@ fn load(path: &Path, settings: &Settings) -> Result<(Graph, Script), ScriptError
 
 fn empty(settings: &Settings, folder: Option<&Path>) -> (Graph, Script) {
     let folders = folder.map(Path::to_path_buf).into_iter().chain(settings.asset_folders.iter().cloned()).collect();
-    let graph = new_graph();
+    let graph = empty_graph();
     let world = graph.find(umbriel_scenegraph::WORLD).map(Node);
     (graph, Script::new(Stage::new(settings.limits.clone(), folders), world))
+}
+
+/// A graph without script, which knows all node types.
+pub(crate) fn empty_graph() -> Graph {
+    let graph = new_graph();
+    if let Err(error) = graph.types().register(expression::node_type()) {
+        tracing::error!("{error}");
+    }
+    graph
 }
 
 fn run(graph: &mut Graph, script: &mut Script, source: Source) -> Result<(), Problem> {
@@ -223,8 +270,11 @@ struct Callbacks<'a> {
 }
 
 impl Host for Callbacks<'_> {
-    fn field_changed(&mut self, graph: &mut Graph, _: FieldId, token: u64) {
+    fn field_changed(&mut self, graph: &mut Graph, field: FieldId, token: u64) {
         let stage = &self.script.stage;
+        if token == BEHAVIOUR {
+            return self.behave(graph, field.node);
+        }
         let Some(handler) = stage.on_change.borrow().get(&token).cloned() else { return };
         stage.with(graph, || {
             let me = handler.me.map(Dynamic::from);
@@ -243,8 +293,32 @@ impl Host for Callbacks<'_> {
         if !graph.contains(node) || stage.switched_off.borrow().contains(&node) {
             return;
         }
-        let definition = stage.definitions.borrow().get(&*graph.type_of(node).name).cloned();
-        let Some(evaluate) = definition.and_then(|d| d.evaluate) else { return };
+        let type_name = graph.type_of(node).name.clone();
+        if &*type_name == EXPRESSION {
+            return expression::evaluate(self.script, graph, node);
+        }
+        self.run_evaluate(graph, node, &type_name);
+    }
+}
+
+impl Callbacks<'_> {
+    /// A node of a native type that a script extends: the first of its fields that was written in a frame has it evaluated.
+    fn behave(&mut self, graph: &mut Graph, node: NodeId) {
+        let stage = &self.script.stage;
+        let mut behaviours = stage.behaviours.borrow_mut();
+        let Some(behaviour) = behaviours.get_mut(&node).filter(|behaviour| behaviour.frame != stage.frame.get()) else { return };
+        behaviour.frame = stage.frame.get();
+        let type_name = behaviour.type_name.clone();
+        drop(behaviours);
+        if !stage.switched_off.borrow().contains(&node) {
+            self.run_evaluate(graph, node, &type_name);
+        }
+    }
+
+    fn run_evaluate(&mut self, graph: &mut Graph, node: NodeId, type_name: &str) {
+        let stage = &self.script.stage;
+        let Some((level, evaluate)) = stage.evaluate_from(type_name) else { return };
+        stage.evaluating.borrow_mut().push((Node(node), level));
         stage.with(graph, || {
             if let Err(mut problem) = self.script.call(&evaluate, vec![Node(node).into(), self.time_s.into()]) {
                 let label = stage.label(Node(node));
@@ -253,6 +327,7 @@ impl Host for Callbacks<'_> {
                 stage.switched_off.borrow_mut().insert(node);
             }
         });
+        stage.evaluating.borrow_mut().clear();
     }
 }
 

@@ -1,5 +1,7 @@
 //! The words of the language: every function that worlds can call, with its documentation.
 
+pub(crate) mod declare;
+mod explain;
 mod handlers;
 mod lists;
 mod maths;
@@ -11,6 +13,8 @@ mod routes;
 mod shapes;
 mod types;
 mod vectors;
+
+pub(crate) use nodes::set;
 
 use std::rc::Rc;
 
@@ -40,8 +44,15 @@ impl Words<'_> {
         doc: &'static str,
         function: impl RhaiNativeFunc<A, N, X, R, F> + 'static,
     ) -> &mut Self {
-        self.docs.push(FunctionDoc { chapter: self.chapter, signature, doc });
-        self.form(signature, function)
+        let known = FunctionDoc { chapter: self.chapter, signature, doc };
+        self.docs.push(known);
+        FuncRegistration::new(known.name())
+            .with_volatility(true)
+            .with_purity(true)
+            .with_params_info(known.parameters())
+            .with_comments([format!("/// {doc}")])
+            .register_into_engine(self.engine, function);
+        self
     }
 
     /// Another form of a function that is documented already; only the name of the signature matters. Constants may be
@@ -63,9 +74,11 @@ pub(crate) fn teach(engine: &mut Engine, stage: &Rc<Stage>) -> Vec<FunctionDoc> 
     nodes::teach(words.chapter("Nodes and fields"));
     routes::teach(words.chapter("Routes"));
     handlers::teach(words.chapter("Handlers"));
+    explain::teach(words.chapter("Explanations"));
     shapes::teach(words.chapter("Shapes and groups"));
     models::teach(words.chapter("Models"));
     types::teach(words.chapter("Node types of your own"));
+    declare::teach(&mut words);
     vectors::teach(words.chapter("Vectors, turns, colours"));
     maths::teach(words.chapter("Numbers"));
     lists::teach(words.chapter("Lists"));

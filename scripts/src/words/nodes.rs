@@ -3,11 +3,12 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use rhai::{Array, Dynamic, FuncRegistration, ImmutableString, Map};
+use rhai::{Array, Dynamic, FuncRegistration, ImmutableString, Map, NativeCallContext};
 use umbriel_fields::{Graph, Kind, NodeId, Value};
 
 use super::Words;
 use crate::error::{Fault, Outcome};
+use crate::expression::{self, EXPRESSION};
 use crate::stage::{Node, Stage};
 use crate::values::{node_or_unit, show};
 
@@ -25,8 +26,20 @@ fn make(words: &mut Words<'_>) {
     let stage = words.stage.clone();
     words.word(
         "make(type: string, fields: map) -> Node",
-        "A node with fields set: `make(\"Box\", #{ size: vec3(1, 2, 1) })`. The entry `name` names it.",
-        move |name: &str, fields: Map| make_with(&stage, name, &fields),
+        "A node with fields set: `make(\"Box\", #{ size: vec3(1, 2, 1) })`. The entry `name` names it. An Expression \
+         takes `inputs`, `code` and `value`: `make(\"Expression\", #{ inputs: #{ a: 1.0 }, code: \"a * 2\" })`.",
+        move |context: NativeCallContext<'_>, name: &str, fields: Map| {
+            let position = context.call_position();
+            stage.write(|graph| stage.set_origin(graph, position));
+            if umbriel_fields::canonical(name) != umbriel_fields::canonical(EXPRESSION) {
+                return make_with(&stage, name, &fields);
+            }
+            let outer = context.global_runtime_state().constants.clone();
+            *stage.running_constants.borrow_mut() = outer.map(|known| known.borrow().clone()).unwrap_or_default();
+            let node = expression::make(&stage, context.engine(), &fields)?;
+            stage.made_at.borrow_mut().insert(node.0, position);
+            Ok(node)
+        },
     );
     let stage = words.stage.clone();
     words.word("delete(node: Node)", "Takes a node out of the world; routes to and from it end.", move |node: Node| {
@@ -60,7 +73,10 @@ fn fields(words: &mut Words<'_>) {
     let read = move |node: &mut Node, field: ImmutableString| get(&stage, *node, &field);
     FuncRegistration::new_index_getter().with_purity(true).register_into_engine(words.engine, read);
     let stage = words.stage.clone();
-    let write = move |node: &mut Node, field: ImmutableString, value: Dynamic| set(&stage, *node, &field, &value);
+    let write = move |context: NativeCallContext<'_>, node: &mut Node, field: ImmutableString, value: Dynamic| {
+        stage.write(|graph| stage.set_origin(graph, context.call_position()));
+        set(&stage, *node, &field, &value)
+    };
     FuncRegistration::new_index_setter().with_purity(true).register_into_engine(words.engine, write);
     let stage = words.stage.clone();
     words.word("fields(node: Node) -> array", "The names of a node's fields.", move |node: &mut Node| field_names(&stage, *node));
@@ -98,14 +114,12 @@ fn fields(words: &mut Words<'_>) {
 pub(super) fn get(stage: &Stage, node: Node, field: &str) -> Outcome<Dynamic> {
     match field {
         "name" | "Name" => Ok(stage.read(|graph| graph.name(node.0).map_or(Dynamic::UNIT, |name| name.to_string().into()))),
-        "type" if stage.read(|graph| graph.contains(node.0)) => {
-            Ok(stage.read(|graph| graph.type_of(node.0).name.to_string().into()))
-        }
+        "type" if stage.read(|graph| graph.contains(node.0)) => Ok(stage.read(|graph| stage.type_name(graph, node.0).into())),
         _ => stage.get(node, field),
     }
 }
 
-pub(super) fn set(stage: &Stage, node: Node, field: &str, value: &Dynamic) -> Outcome<()> {
+pub(crate) fn set(stage: &Stage, node: Node, field: &str, value: &Dynamic) -> Outcome<()> {
     match field {
         "name" | "Name" => {
             let Some(name) = value.read_lock::<ImmutableString>() else {
@@ -208,19 +222,23 @@ fn find(words: &mut Words<'_>) {
             stage.read(|graph| {
                 let wanted = graph.types().get(name).map_err(|e| Fault::new(e.to_string()))?;
                 let mut found = below(graph, top.0);
-                found.retain(|id| graph.type_of(*id).name == wanted.name);
+                found.retain(|id| stage.is_a(graph, *id, &wanted.name));
                 Ok(found.into_iter().map(|id| Dynamic::from(Node(id))).collect())
             })
         },
     );
     let stage = words.stage.clone();
-    words.word("find_all(type: string) -> array", "All nodes of a type.", move |name: &str| -> Outcome<Array> {
-        let wanted = stage.read(|graph| graph.types().get(name)).map_err(|e| Fault::new(e.to_string()))?;
-        Ok(stage.read(|graph| {
-            let of_type = |id: &NodeId| graph.type_of(*id).name == wanted.name;
-            graph.nodes().filter(of_type).map(|id| Dynamic::from(Node(id))).collect()
-        }))
-    });
+    words.word(
+        "find_all(type: string) -> array",
+        "All nodes of a type, and of types of the world that extend it.",
+        move |name: &str| -> Outcome<Array> {
+            let wanted = stage.read(|graph| graph.types().get(name)).map_err(|e| Fault::new(e.to_string()))?;
+            Ok(stage.read(|graph| {
+                let of_type = |id: &NodeId| stage.is_a(graph, *id, &wanted.name);
+                graph.nodes().filter(of_type).map(|id| Dynamic::from(Node(id))).collect()
+            }))
+        },
+    );
     let stage = words.stage.clone();
     words.word("types() -> array", "The names of all node types.", move || -> Array {
         stage.read(|graph| graph.types().iter().map(|node_type| node_type.name.to_string().into()).collect())

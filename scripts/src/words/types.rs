@@ -1,62 +1,123 @@
-//! Node types that a world defines.
+//! Node types that a world defines, from nothing or on top of another type.
 
 use rhai::{Dynamic, FnPtr, Map, NativeCallContext, Position};
-use umbriel_fields::{Field, FieldType, Kind, NodeType};
+use umbriel_fields::{Evaluator, Field, Mode, NodeType, Value};
 
 use super::Words;
+use super::declare::declared;
+use crate::definition::Definition;
 use crate::error::{Fault, Outcome, fail, hint};
-use crate::stage::{Definition, Handler, Stage};
-use crate::values::{EmptyList, natural, show};
+use crate::stage::{Handler, Node, Stage};
+use crate::values::{show, to_value};
 
 pub(super) fn teach(words: &mut Words<'_>) {
-    words.engine.register_type_with_name::<EmptyList>("List");
     let stage = words.stage.clone();
     words.word(
         "define(type: string, parts: map)",
         "A node type of your own. `fields` gives names and first values; `evaluate: |me, time|` runs in each frame in which one of \
-         the fields was written, or in every frame with `always: true`; `changed: #{ field: |me, value| }` runs when a field changed.",
+         the fields was written, or in every frame with `always: true`; `changed: #{ field: |me, value| }` runs when a field changed; \
+         `extends: \"Transform\"` begins with the fields and the behaviour of another type; `doc` says what it is.",
         move |context: NativeCallContext<'_>, name: &str, parts: Map| define(&stage, name, &parts, context.call_position()),
     );
+    let stage = words.stage.clone();
     words.word(
-        "list(kind: string) -> list",
-        "An empty list of a kind, as first value of a field: `list(\"vec3\")`.",
-        |kind: &str| -> Outcome<EmptyList> {
-            match Kind::ALL.iter().find(|known| known.name() == kind) {
-                Some(kind) => Ok(EmptyList(*kind)),
-                None => fail(format!("there is no kind of value `{kind}`{}", hint(kind, Kind::ALL.iter().map(|k| k.name())))),
-            }
-        },
+        "evaluate_base(me: Node, time: number)",
+        "Within an `evaluate`: does what `evaluate` of the type does that this one extends.",
+        move |context: NativeCallContext<'_>, me: Node, time: Dynamic| evaluate_base(&stage, &context, me, time),
     );
 }
 
-const PARTS: [&str; 5] = ["fields", "evaluate", "changed", "always", "doc"];
+const PARTS: [&str; 6] = ["fields", "evaluate", "changed", "always", "doc", "extends"];
 
 fn define(stage: &Stage, name: &str, parts: &Map, place: Position) -> Outcome<()> {
+    stage.may_change()?;
     let handler = |part: &str, given: &Dynamic| function(name, part, given).map(|call| Handler { call, place });
     if let Some(unknown) = parts.keys().find(|key| !PARTS.contains(&key.as_str())) {
         return fail(format!("define has no part `{unknown}`; it takes {}", PARTS.join(", ")));
     }
-    let fields = map_of(parts, "fields")?;
-    let changed = map_of(parts, "changed")?;
-    let evaluate = parts.get("evaluate").map(|f| handler("evaluate", f)).transpose()?;
+    let base = parts.get("extends").map(|base| base_type(stage, name, base)).transpose()?;
+    let mut definition = base.as_ref().map_or_else(Definition::default, |base| Definition::on(stage, base));
+    definition.evaluate = parts.get("evaluate").map(|f| handler("evaluate", f)).transpose()?;
+    if let Some(always) = parts.get("always") {
+        definition.always = always.as_bool() == Ok(true);
+    }
+    let own = map_of(parts, "fields")?;
+    let mut fields = base.as_ref().map(|base| base.fields.clone()).unwrap_or_default();
+    for (field, given) in &own {
+        add(&mut fields, &mut definition, name, field, given)?;
+    }
     let doc = parts.get("doc").map(ToString::to_string).unwrap_or_default();
-    let mut node_type = NodeType::new(name, doc);
-    for (field, default) in &fields {
-        node_type = node_type.field(declared(name, field, default)?);
-    }
-    if evaluate.is_some() {
+    let mut node_type = NodeType::new(name, doc).fields(fields);
+    if definition.is_evaluated(stage) && definition.native.is_none() {
         node_type = node_type.host_evaluated();
-        if parts.get("always").is_some_and(|always| always.as_bool() == Ok(true)) {
-            node_type = node_type.always_evaluate();
-        }
+        node_type.mode = if definition.always { Mode::Always } else { Mode::OnChange };
     }
-    let changed = changed.iter().map(|(field, f)| Ok((field.to_string(), handler(field, f)?))).collect::<Outcome<Vec<_>>>()?;
-    if let Some((field, _)) = changed.iter().find(|(field, _)| node_type.field_index(field).is_none()) {
-        return fail(format!("{name} has no field `{field}` to watch{}", hint(field, fields.keys().map(|k| k.as_str()))));
+    for (field, f) in &map_of(parts, "changed")? {
+        let Some(known) = node_type.field_named(field) else {
+            return fail(format!("{name} has no field `{field}` to watch{}", hint(field, own.keys().map(|k| k.as_str()))));
+        };
+        definition.changed.retain(|(other, _)| **other != *known.name);
+        definition.changed.push((known.name.to_string(), handler(field, f)?));
     }
     let registered = stage.read(|graph| graph.types().register(node_type)).map_err(|e| Fault::new(e.to_string()))?;
-    stage.definitions.borrow_mut().insert(registered.name.to_string(), Definition { evaluate, changed });
+    stage.definitions.borrow_mut().insert(registered.name.to_string(), definition);
     Ok(())
+}
+
+fn base_type(stage: &Stage, name: &str, given: &Dynamic) -> Outcome<std::sync::Arc<NodeType>> {
+    let base = given.to_string();
+    let base = stage.read(|graph| graph.types().get(&base)).map_err(|e| Fault::new(format!("{name} cannot extend it: {e}")))?;
+    let of_a_script = stage.definitions.borrow().contains_key(&*base.name);
+    match base.evaluator {
+        Evaluator::Host if !of_a_script => fail(format!("{name} cannot extend {}: that is made by other means", base.name)),
+        _ => Ok(base),
+    }
+}
+
+/// A new field, or another first value for one of the base.
+fn add(fields: &mut Vec<Field>, definition: &mut Definition, owner: &str, name: &str, given: &Dynamic) -> Outcome<()> {
+    let wrong = |why: String| Fault::new(format!("field `{name}` of {owner}: {why}"));
+    let canonical = umbriel_fields::canonical(name);
+    let Some(place) = fields.iter().position(|field| field.is_named(&canonical)) else {
+        let field = declared(name, given).map_err(wrong)?;
+        definition.own_fields.push(field.clone());
+        fields.push(field);
+        return Ok(());
+    };
+    let known = &mut fields[place];
+    let value = match declared(name, given) {
+        Ok(field) if field.field_type == known.field_type && field.choices == known.choices => field.default,
+        _ => to_value(given, known.field_type).map_err(wrong)?,
+    };
+    let value = match &value {
+        Value::String(text) if !known.choices.is_empty() => {
+            let choice = known.choice_value(text).map(Value::from);
+            choice.ok_or_else(|| wrong(format!("\"{text}\" is none of {}", known.choices.join(", "))))?
+        }
+        _ => value,
+    };
+    known.default = value.clone();
+    let (known, own) = (known.name.clone(), definition.own_fields.iter_mut().find(|field| field.is_named(&canonical)));
+    match own {
+        Some(own) => own.default = value,
+        None => definition.defaults.push((known, value)),
+    }
+    Ok(())
+}
+
+/// Goes on with the next `evaluate` up the chain of types; which one runs now is known to the stage.
+fn evaluate_base(stage: &Stage, context: &NativeCallContext<'_>, me: Node, time: Dynamic) -> Outcome<()> {
+    let running = stage.evaluating.borrow().last().cloned();
+    let Some((_, level)) = running.filter(|(node, _)| *node == me) else {
+        return fail("evaluate_base works within the evaluate of a node type, with its own node");
+    };
+    let Some((base, handler)) = stage.evaluate_above(&level) else {
+        return fail(format!("{level} extends no type with an evaluate of its own"));
+    };
+    stage.evaluating.borrow_mut().push((me, base));
+    let result = handler.call.call_within_context::<Dynamic>(context, (me, time));
+    stage.evaluating.borrow_mut().pop();
+    result.map(drop)
 }
 
 fn map_of(parts: &Map, name: &str) -> Outcome<Map> {
@@ -73,15 +134,5 @@ fn function(type_name: &str, part: &str, given: &Dynamic) -> Outcome<FnPtr> {
     match given.read_lock::<FnPtr>() {
         Some(function) => Ok(function.clone()),
         None => fail(format!("`{part}` of {type_name} takes a function, not {}", show(given))),
-    }
-}
-
-fn declared(type_name: &str, field: &str, default: &Dynamic) -> Outcome<Field> {
-    if default.is_unit() {
-        return Ok(Field::of_type(field, FieldType::one(Kind::Node)));
-    }
-    match natural(default) {
-        Ok(value) => Ok(Field::new(field, value)),
-        Err(why) => fail(format!("field `{field}` of {type_name}: {why}")),
     }
 }
