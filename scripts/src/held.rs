@@ -75,10 +75,14 @@ fn switch_off(stage: &Stage, owner: &Owner) {
             stage.on_change.borrow_mut().remove(id);
         }
         Owner::Evaluate(name) => {
-            stage.definitions.borrow_mut().get_mut(name).map(|definition| definition.evaluate = None);
+            if let Some(definition) = stage.definitions.borrow_mut().get_mut(name) {
+                definition.evaluate = None;
+            }
         }
         Owner::Changed(name, place) => {
-            stage.definitions.borrow_mut().get_mut(name).map(|definition| definition.changed.remove(*place));
+            if let Some(definition) = stage.definitions.borrow_mut().get_mut(name) {
+                definition.changed.remove(*place);
+            }
         }
     }
 }
