@@ -67,8 +67,6 @@ pub(crate) struct Stage {
     pub(crate) evaluating: RefCell<Vec<(Node, String)>>,
     /// Texts of Expressions, compiled.
     pub(crate) compiled: RefCell<Compiled>,
-    /// How many texts were compiled.
-    pub(crate) compilations: Cell<u64>,
     /// The functions of the world, for Expressions.
     pub(crate) functions: RefCell<AST>,
     pub(crate) property_names: PropertyNames,
@@ -109,7 +107,6 @@ impl Stage {
             always: RefCell::default(),
             evaluating: RefCell::default(),
             compiled: RefCell::default(),
-            compilations: Cell::new(0),
             functions: RefCell::new(AST::empty()),
             property_names: PropertyNames::default(),
             running_constants: RefCell::default(),

@@ -343,3 +343,22 @@ fn keep_poses(old: &Graph, new: &mut Graph) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_text_of_expressions_is_compiled_once() {
+        let script = "let all = each(100, |i| make(\"Expression\", #{ inputs: #{ a: i }, code: \"a * 2\" }));
+            on_frame(|time| { for e in all { e.a = time.to_int(); } });";
+        let mut world = World::load_source("test", script).unwrap_or_else(|error| panic!("{error}"));
+        let compiled = |world: &World| {
+            let known = world.script.stage.compiled.borrow();
+            known.iter().map(|(code, ast)| (code.to_string(), Rc::as_ptr(ast))).collect::<Vec<_>>()
+        };
+        let before = compiled(&world);
+        let evaluated: usize = (1..5).map(|frame| world.step(f64::from(frame)).evaluated).sum();
+        assert_eq!((evaluated, before.len(), compiled(&world)), (400, 1, before));
+    }
+}

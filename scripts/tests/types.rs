@@ -9,13 +9,16 @@ fn at(world: &mut World, expression: &str) -> String {
     world.console(expression).unwrap_or_else(|problem| panic!("{expression}\n{problem}"))
 }
 
+/// A script, the times of its frames, and expressions with their values.
+type Row<'a> = (&'a str, &'a [f64], &'a [(&'a str, &'a str)]);
+
 /// Each script runs without a problem; then the expressions have these values.
 #[test]
 fn types_on_types() {
     let pulse = "define(\"Pulse\", #{ doc: \"Beats.\", fields: #{ rate: 1.0, value: 0.0, runs: 0 }, always: true,
         evaluate: |me, time| { me.value = time * me.rate; me.runs += 1; },
         changed: #{ rate: |me, rate| print(rate) } });\n";
-    let rows: &[(&str, &[f64], &[(&str, &str)])] = &[
+    let rows: &[Row<'_>] = &[
         // all is inherited, a first value is another
         ("define(\"Fast\", #{ extends: \"Pulse\", fields: #{ rate: 5 } }); let f = make(\"Fast\");", &[1.0, 2.0], &[("f.value", "10.0"), ("f.type", "Fast")]),
         ("define(\"Fast\", #{ extends: \"Pulse\", fields: #{ rate: field(5.0, #{ unit: \"Hz\" }) } }); let f = make(\"Fast\");", &[2.0], &[("f.value", "10.0")]),
