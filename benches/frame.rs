@@ -55,7 +55,8 @@ fn main() -> Outcome<()> {
         }
     }
     println!("\n| CPU, ms per frame (median of {FRAMES}) | |\n|---|---|");
-    let names = ["evaluate fields", "bring the scene up to date", "turn the rig into views", "renderer: prepare", "renderer: record"];
+    let names =
+        ["evaluate fields", "bring the scene up to date", "turn the rig into views", "renderer: prepare", "renderer: record"];
     let mut sum = 0.0;
     for (column, name) in names.iter().enumerate() {
         let mut values: Vec<f64> = rows.iter().map(|r| r[column]).collect();

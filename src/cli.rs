@@ -154,6 +154,9 @@ pub(crate) struct ShadowError {
 pub(crate) struct Nodes {
     /// One type; otherwise all of them, a line each
     pub(crate) name: Option<String>,
+    /// Write definitions for editors of rhai scripts into this folder
+    #[arg(long, conflicts_with = "name")]
+    pub(crate) definitions: Option<PathBuf>,
 }
 
 /// How a light casts shadows.

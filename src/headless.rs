@@ -23,8 +23,12 @@ pub(crate) fn run(args: &Run) -> Result<usize, Box<dyn std::error::Error>> {
     let device = describe(&gpu);
     tracing::info!("drawing on {device}");
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}.png", session.name())));
+    if out.extension().is_some_and(|e| !e.eq_ignore_ascii_case("png")) {
+        return Err(format!("{}: pictures are written as .png", out.display()).into());
+    }
     let bar = progress(args.frames, "frames");
     let (mut problems, mut last) = (0, 0);
+    let mut is_named = None;
     if args.time > 0.0 {
         session.step(0.0); // what starts with the world starts before the jump
     }
@@ -34,7 +38,8 @@ pub(crate) fn run(args: &Run) -> Result<usize, Box<dyn std::error::Error>> {
         let stats = renderer.render(session.scene(), &pictures)?;
         tracing::debug!("frame {frame}: {stats:?}");
         for (place, picture) in pictures.iter().enumerate() {
-            let name = (pictures.len() > 1).then_some(picture.name.as_str());
+            // Names stay the same through a sequence, even where displays fail on the way.
+            let name = is_named.get_or_insert(pictures.len() > 1).then_some(picture.name.as_str());
             let path = numbered(&out, name, (args.frames > 1).then_some(frame));
             png::write(&path, &png::row(&renderer.read_back(place)?), &device)?;
             last += 1;

@@ -21,10 +21,16 @@ use std::process::ExitCode;
 const WITH_PROBLEMS: u8 = 2;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            let _ = error.print();
+            return if error.use_stderr() { ExitCode::FAILURE } else { ExitCode::SUCCESS };
+        }
+    };
     let filter = tracing_subscriber::EnvFilter::try_from_default_env();
     tracing_subscriber::fmt()
-        .with_env_filter(filter.unwrap_or_else(|_| "warn,wgpu_hal=error,wgpu_core=error,naga=error".into()))
+        .with_env_filter(filter.unwrap_or_else(|_| "warn,umbriel_scripts=info,wgpu_hal=error,wgpu_core=error,naga=error".into()))
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .without_time()
@@ -36,6 +42,9 @@ fn main() -> ExitCode {
         Command::ShadowError(args) => shadow_error::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Explain(args) => replay::explain(args).map(|text| print(&text)),
+        Command::Nodes(cli::Nodes { definitions: Some(folder), .. }) => {
+            nodes::write_definitions(folder).map(|text| print(&text)).map_err(|e| format!("{}: {e}", folder.display()).into())
+        }
         Command::Nodes(args) => nodes::reference(args.name.as_deref()).map(|text| print(&text)).map_err(Into::into),
     };
     match result {

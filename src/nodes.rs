@@ -1,8 +1,20 @@
 //! Prints the reference of node types from their declarations.
 
 use std::fmt::Write;
+use std::path::Path;
 use umbriel_fields::{Error, Field, NodeType, Value};
 use umbriel_scenegraph::new_graph;
+
+/// Writes the definitions that editors of scripts read; gives what was written.
+pub(crate) fn write_definitions(folder: &Path) -> Result<String, std::io::Error> {
+    std::fs::create_dir_all(folder)?;
+    let mut text = String::new();
+    for (name, definitions) in umbriel_scripts::definitions() {
+        std::fs::write(folder.join(&name), definitions)?;
+        let _ = writeln!(text, "{}", folder.join(&name).display());
+    }
+    Ok(text)
+}
 
 /// The reference of one type, or a line for each.
 pub(crate) fn reference(name: Option<&str>) -> Result<String, Error> {

@@ -200,7 +200,12 @@ impl Session {
         }
         match &mut self.source {
             Source::World(world) if self.path.extension().is_some_and(|e| e == "rhai") => {
-                world.reload();
+                let stood = self.navigation.and_then(|n| n.read(world.graph()).ok());
+                if let (true, Some(navigator)) = (world.reload(), stood) {
+                    let graph = world.graph_mut();
+                    let kept = NavigationNode::find_or_create(graph, navigator.center).and_then(|n| n.write(graph, &navigator));
+                    self.problems.extend(kept.err().map(|e| e.to_string()));
+                }
                 self.problems.extend(world.problems().iter().map(ToString::to_string));
             }
             Source::World(_) => match Session::open(&self.path) {

@@ -52,14 +52,8 @@ impl Source {
     pub(crate) fn step(&mut self, time_s: f64) -> Vec<String> {
         match self {
             Source::World(world) => {
-                let report = world.step(time_s);
-                let mut problems: Vec<String> = world.problems().iter().map(ToString::to_string).collect();
-                let graph = world.graph();
-                problems.extend(report.problems.iter().map(|p| {
-                    let place = p.field.map_or_else(|| graph.describe(p.node), |f| graph.describe_field(f));
-                    format!("{place}: {}", p.message)
-                }));
-                problems
+                world.step(time_s);
+                world.problems().iter().map(ToString::to_string).collect()
             }
             Source::Replay(replay) => match replay.step() {
                 Ok(Some(divergence)) => vec![format!("the replay differs: {divergence}")],

@@ -121,7 +121,10 @@ fn included(line: &str) -> Option<Result<&str, &'static str>> {
 }
 
 fn read_text(path: &Path) -> Result<String, ScriptError> {
-    std::fs::read_to_string(path).map_err(|e| ScriptError::Unreadable { path: path.to_path_buf(), reason: e.to_string() })
+    let text = std::fs::read_to_string(path);
+    let text = text.map_err(|e| ScriptError::Unreadable { path: path.to_path_buf(), reason: e.to_string() })?;
+    // Some editors begin a file with a byte-order mark.
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
 /// A file below a folder: no absolute paths, none that lead out of it, not even through links.

@@ -6,10 +6,12 @@ use super::pane::Pane;
 use super::{App, Options, WindowSizes};
 use crate::{Error, FileWatch, navigation};
 use std::collections::BTreeSet;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 use umbriel_render::{Gpu, Renderer};
 use umbriel_scene::Picture;
 use winit::application::ApplicationHandler;
+use winit::error::EventLoopError;
 use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::window::WindowId;
@@ -22,7 +24,7 @@ const NAP: Duration = Duration::from_millis(50);
 /// # Errors
 /// There is no window system or no usable graphics device, or the device failed.
 pub fn run(app: &mut impl App, options: Options) -> Result<(), Error> {
-    let event_loop = EventLoop::new().map_err(|e| Error::Window(e.to_string()))?;
+    let event_loop = EventLoop::new().map_err(window_error)?;
     let now = Instant::now();
     let mut windows = Windows {
         app,
@@ -39,8 +41,25 @@ pub fn run(app: &mut impl App, options: Options) -> Result<(), Error> {
         screenshot: false,
         failure: None,
     };
-    event_loop.run_app(&mut windows).map_err(|e| Error::Window(e.to_string()))?;
+    // winit panics where the connection to the window system is lost; for us that is an error like others.
+    match catch_unwind(AssertUnwindSafe(|| event_loop.run_app(&mut windows))) {
+        Ok(ended) => ended.map_err(window_error)?,
+        Err(panic) => {
+            let reason = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+            // What is left of the windows talks to a window system that is gone.
+            std::mem::forget(windows);
+            return Err(Error::Window(format!("the window system is gone: {}", reason.unwrap_or("no reason given"))));
+        }
+    }
     windows.failure.map_or(Ok(()), Err)
+}
+
+/// The reason without the place in winit's source that its message begins with.
+fn window_error(error: EventLoopError) -> Error {
+    match error {
+        EventLoopError::Os(os) => Error::Window(os.to_string().rsplit(": ").next().unwrap_or_default().to_owned()),
+        other => Error::Window(other.to_string()),
+    }
 }
 
 struct Windows<'a, A> {

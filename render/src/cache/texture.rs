@@ -108,9 +108,14 @@ pub(crate) fn make_sampler(device: &wgpu::Device, sampler: Sampler) -> wgpu::Sam
         min_filter: filter,
         mipmap_filter: if is_linear { wgpu::MipmapFilterMode::Linear } else { wgpu::MipmapFilterMode::Nearest },
         lod_max_clamp: if sampler.mip_maps { 32.0 } else { 0.0 },
-        anisotropy_clamp: if is_linear && sampler.mip_maps { 8 } else { 1 },
+        anisotropy_clamp: if is_linear && sampler.mip_maps && has_sound_anisotropy(device) { 8 } else { 1 },
         ..Default::default()
     })
+}
+
+/// Mesa's software driver gives black where the texture coordinates of a triangle are all the same and anisotropy is on.
+fn has_sound_anisotropy(device: &wgpu::Device) -> bool {
+    device.adapter_info().device_type != wgpu::DeviceType::Cpu
 }
 
 #[cfg(test)]

@@ -62,20 +62,26 @@ pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, 
     found
 }
 
+/// A first slice never has to reach farther than this many metres; wide worlds get more maps instead.
+const FIRST_SLICE_M: f32 = 2.0;
+
 /// Ranges of distance, one per map: between equal steps and equal ratios (Zhang et al. 2006, Parallel-split shadow
-/// maps, section 3). Every slice but the first starts at 0 too where views look into different directions, since a map
+/// maps, section 3); where sight is far, equal steps would leave nothing for what is near, so they weigh less. Every slice but the first starts at 0 too where views look into different directions, since a map
 /// then holds what is near as well.
 fn slices(eyes: &[Eye]) -> Vec<(f32, f32)> {
     let far = eyes.iter().map(|e| e.far).fold(0.0, f32::max) * 1.001;
-    let near = eyes.iter().map(|e| e.near).fold(f32::INFINITY, f32::min).max(far * 0.01);
+    let near = eyes.iter().map(|e| e.near).fold(f32::INFINITY, f32::min).max((far * 0.01).min(FIRST_SLICE_M));
     if far <= 0.0 || near >= far {
         return Vec::new();
     }
-    let count = ((far / near).log2() * 0.8).ceil().clamp(1.0, 4.0);
+    // Six maps are what the shader takes for a light into all directions.
+    let most = if far > 400.0 * near { 5.0 } else { 4.0 };
+    let count = ((far / near).log2() * 0.8).ceil().clamp(1.0, most);
+    let steps = 0.3 * (100.0 * FIRST_SLICE_M / far).min(1.0);
     let split = |i: f32| {
         let share = i / count;
         let (by_ratio, by_step) = (near * (far / near).powf(share), near + (far - near) * share);
-        0.7 * by_ratio + 0.3 * by_step
+        (1.0 - steps) * by_ratio + steps * by_step
     };
     let mut from = 0.0;
     let mut ranges = Vec::new();

@@ -1,6 +1,6 @@
 // A triangle that covers the screen, at infinity.
 struct Fullscreen {
-    @builtin(position) clip: vec4<f32>,
+    @builtin(position) @invariant clip: vec4<f32>,
     @location(0) ndc: vec2<f32>,
 };
 
