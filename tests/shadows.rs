@@ -56,6 +56,25 @@ fn a_coarse_map_is_seen_to_be_worse() {
     assert!(at("64").1 + 0.02 < at("2048").1);
 }
 
+/// A box under the eye in worlds of several widths: maps are fine where one looks, not where the world ends.
+#[test]
+fn wide_worlds_keep_fine_maps_near_the_eye() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("wide");
+    std::fs::create_dir_all(&folder).expect("a folder can be made");
+    for side_m in [20, 1_000, 10_000] {
+        let path = folder.join(format!("floor_{side_m}.rhai"));
+        let world = format!(
+            "world.add(shape(plane({side_m}, {side_m})));\n\
+             world.add(transform(#{{ translation: vec3(0, 0.5, 0) }}, shape(cuboid(vec3(1, 1, 1)))));\n\
+             world.add(make(\"DirectionalLight\", #{{ name: \"sun\", direction: vec3(0.5, -0.6, 0.3), shadows: \"map\" }}));\n\
+             world.add(make(\"Viewpoint\", #{{ position: vec3(4, 2, 7), orientation: look(vec3(4, 2, 7), vec3(0, 0.5, 0)) }}));\n"
+        );
+        std::fs::write(&path, world).expect("a world can be written");
+        let found = scored(&[path.to_str().expect("paths are text"), "--light", "sun"]);
+        assert!(found.1 >= 0.97, "floor of {side_m} m: {found:?}");
+    }
+}
+
 #[test]
 fn our_worlds_agree_with_the_tracer() {
     // World, light, view, worst disagreement in percent, worst IoU.
