@@ -110,7 +110,10 @@ impl Script {
 
     fn evaluate(&mut self, ast: &AST) -> Result<Dynamic, Problem> {
         let mut scope = std::mem::take(&mut self.scope);
-        let run = || self.engine.eval_ast_with_scope::<Dynamic>(&mut scope, ast);
+        let run = || {
+            self.stage.meter.begin_with(&scope);
+            self.engine.eval_ast_with_scope::<Dynamic>(&mut scope, ast)
+        };
         let result = self.guarded(self.stage.limits.main, run);
         let constants = scope.iter_raw().filter(|(_, constant, _)| *constant);
         *self.constants.borrow_mut() = constants.map(|(name, _, value)| (name.to_string(), value.flatten_clone())).collect();

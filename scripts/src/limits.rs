@@ -150,6 +150,11 @@ impl Meter {
         verdict
     }
 
+    /// The run that is going on begins with these variables.
+    pub(crate) fn begin_with(&self, scope: &rhai::Scope<'_>) {
+        self.scales.borrow_mut().begin_with(scope);
+    }
+
     fn next_forced(&self) -> u64 {
         self.scales.borrow().last_operation + WEIGH_EVERY
     }

@@ -13,21 +13,32 @@ const DEPTH: usize = 200_000;
 const CELL: usize = size_of::<Dynamic>();
 const BOXED: usize = 64;
 const MAP_ENTRY: usize = 64;
+/// Bytes that a line of the console may add to variables that hold too much already.
+const ROOM: usize = 64 << 10;
 
 /// Weighs scopes, one for each level of calls: what callers hold counts too.
 pub(crate) struct Scales {
     limit: usize,
+    /// What was held before the run that is weighed: more than the limit where handlers were switched off too late.
+    held_before: usize,
     levels: Vec<usize>,
     pub(crate) last_operation: u64,
 }
 
 impl Scales {
     pub(crate) fn new(limit: usize) -> Self {
-        Self { limit, levels: Vec::new(), last_operation: 0 }
+        Self { limit, held_before: 0, levels: Vec::new(), last_operation: 0 }
     }
 
+    /// A new run begins.
     pub(crate) fn clear(&mut self) {
         self.levels.clear();
+        self.held_before = 0;
+    }
+
+    /// The run begins with these variables. It may use them, however much they hold, and add a little.
+    pub(crate) fn begin_with(&mut self, scope: &Scope<'_>) {
+        self.held_before = weight(scope.iter_raw().map(|(_, _, value)| value)).saturating_add(ROOM);
     }
 
     /// Says why the script must end, if it must.
@@ -35,7 +46,7 @@ impl Scales {
         self.levels.resize(level + 1, 0);
         self.levels[level] = 0;
         let held: usize = self.levels.iter().sum();
-        let mut load = Load { bytes: 0, limit: self.limit.saturating_sub(held), seen: HashSet::new() };
+        let mut load = Load { bytes: 0, limit: self.limit.max(self.held_before).saturating_sub(held), seen: HashSet::new() };
         let verdict = scope.iter_raw().try_for_each(|(_, _, value)| load.add(value, 0));
         self.levels[level] = load.bytes;
         match verdict {

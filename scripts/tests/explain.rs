@@ -97,6 +97,13 @@ fn all_handlers_together_are_bounded() {
     let before: u32 = world.console("n").expect("n").parse().expect("a number");
     world.step(1e6);
     assert_eq!(world.console("n").expect("n"), (before + 1).to_string());
+    // Long enough to be weighed for certain: what is there may be used and let go, and not grow.
+    let long = |text: &str| format!("let k = 0; while k < 300000 {{ k += 1; }} {text}");
+    assert_eq!(world.console(&long("e.len() > 0")).expect("long"), "true");
+    let more = world.console("let more = []; more.pad(200000, 0); for k in 0..300000 { more[0] += 1; }").expect_err("more");
+    assert!(more.to_string().contains("16 MB"), "{more}");
+    world.console("more = []; e = []").expect("let go");
+    world.console("let more = []; more.pad(100000, 0); for k in 0..300000 { more[0] += 1; } more = []").expect("room again");
 }
 
 /// Editors get every function with its documentation, and every field.
