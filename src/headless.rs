@@ -9,62 +9,91 @@ use umbriel_displays::WindowSizes;
 use umbriel_render::{Gpu, Renderer};
 use umbriel_scene::Picture;
 
+type Failure = Box<dyn std::error::Error>;
+
 /// Pixels of a picture whose size nobody says.
 pub(crate) const DESKTOP_SIZE: [u32; 2] = [1280, 720];
 
 /// Draws the frames that were asked for. Gives the number of problems that were reported meanwhile.
-pub(crate) fn run(args: &Run) -> Result<usize, Box<dyn std::error::Error>> {
+pub(crate) fn run(args: &Run) -> Result<usize, Failure> {
     let mut session = Session::open(&args.path)?;
     if let Some(file) = &args.record {
         session.record(file)?;
+    }
+    let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}.png", session.name())));
+    if args.time > 0.0 {
+        session.step(0.0); // what starts with the world starts before the jump
+    }
+    let time_s = |frame: u32| args.time + f64::from(frame) / args.fps;
+    let drawn = draw(&mut session, 0..args.frames, time_s, &Wanted { view: args.view.as_deref(), size: args.size, out: &out })?;
+    if let Some(frames) = session.finish_recording()? {
+        println!("{frames} frames recorded");
+    }
+    println!("{} pictures, the last {}", drawn.pictures, drawn.last.display());
+    Ok(drawn.problems)
+}
+
+/// What is drawn, and where to.
+pub(crate) struct Wanted<'a> {
+    /// The display or viewpoint, by name.
+    pub(crate) view: Option<&'a str>,
+    /// Pixels of each picture.
+    pub(crate) size: Option<[u32; 2]>,
+    pub(crate) out: &'a Path,
+}
+
+/// What became of it.
+#[derive(Default)]
+pub(crate) struct Drawn {
+    pub(crate) pictures: u32,
+    pub(crate) last: PathBuf,
+    pub(crate) problems: usize,
+}
+
+/// Steps a session through frames and writes the pictures of each.
+pub(crate) fn draw(
+    session: &mut Session,
+    frames: std::ops::Range<u32>,
+    time_s: impl Fn(u32) -> f64,
+    wanted: &Wanted<'_>,
+) -> Result<Drawn, Failure> {
+    if wanted.out.extension().is_some_and(|e| !e.eq_ignore_ascii_case("png")) {
+        return Err(format!("{}: pictures are written as .png", wanted.out.display()).into());
     }
     let gpu = Gpu::new(None)?;
     let mut renderer = Renderer::new(&gpu)?;
     let device = describe(&gpu);
     tracing::info!("drawing on {device}");
-    let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}.png", session.name())));
-    if out.extension().is_some_and(|e| !e.eq_ignore_ascii_case("png")) {
-        return Err(format!("{}: pictures are written as .png", out.display()).into());
-    }
-    let bar = progress(args.frames, "frames");
-    let (mut problems, mut last) = (0, 0);
+    let bar = progress(frames.len() as u32, "frames");
+    let mut drawn = Drawn::default();
     let mut is_named = None;
-    if args.time > 0.0 {
-        session.step(0.0); // what starts with the world starts before the jump
-    }
-    for frame in 0..args.frames {
-        session.step(args.time + f64::from(frame) / args.fps);
-        let pictures = pictures(&mut session, args.view.as_deref(), args.size)?;
+    let is_sequence = frames.len() > 1;
+    for frame in frames {
+        session.step(time_s(frame));
+        let pictures = pictures(session, wanted.view, wanted.size)?;
         let stats = renderer.render(session.scene(), &pictures)?;
         tracing::debug!("frame {frame}: {stats:?}");
         for (place, picture) in pictures.iter().enumerate() {
             // Names stay the same through a sequence, even where displays fail on the way.
             let name = is_named.get_or_insert(pictures.len() > 1).then_some(picture.name.as_str());
-            let path = numbered(&out, name, (args.frames > 1).then_some(frame));
+            let path = numbered(wanted.out, name, is_sequence.then_some(frame));
             png::write(&path, &png::row(&renderer.read_back(place)?), &device)?;
-            last += 1;
+            drawn.pictures += 1;
             bar.set_message(path.display().to_string());
+            drawn.last = path;
         }
         for problem in session.problems().into_iter().chain(renderer.problems()) {
             bar.suspend(|| tracing::error!("{problem}"));
-            problems += 1;
+            drawn.problems += 1;
         }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    if let Some(frames) = session.finish_recording()? {
-        println!("{frames} frames recorded");
-    }
-    println!("{last} pictures, the last {}", bar.message());
-    Ok(problems)
+    Ok(drawn)
 }
 
 /// The pictures of the frame; `size` is that of each of them.
-pub(crate) fn pictures(
-    session: &mut Session,
-    view: Option<&str>,
-    size: Option<[u32; 2]>,
-) -> Result<Vec<Picture>, umbriel_displays::Error> {
+fn pictures(session: &mut Session, view: Option<&str>, size: Option<[u32; 2]>) -> Result<Vec<Picture>, umbriel_displays::Error> {
     let natural = session.pictures(view, size.unwrap_or(DESKTOP_SIZE), &WindowSizes::new())?;
     let Some(size) = size else { return Ok(natural) };
     let windows: WindowSizes = natural.into_iter().map(|p| (p.name, size)).collect();
@@ -89,7 +118,7 @@ pub(crate) fn progress(length: u32, unit: &str) -> ProgressBar {
 }
 
 /// `out.png`, `out.wall.png`, `out.0007.png`, `out.wall.0007.png`.
-pub(crate) fn numbered(out: &Path, picture: Option<&str>, frame: Option<u32>) -> PathBuf {
+fn numbered(out: &Path, picture: Option<&str>, frame: Option<u32>) -> PathBuf {
     let mut name = out.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     for part in [picture.map(file_name), frame.map(|f| format!("{f:04}"))].into_iter().flatten() {
         name = format!("{name}.{part}");

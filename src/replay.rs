@@ -2,13 +2,11 @@
 
 use crate::cli;
 use crate::headless;
-use crate::png;
 use crate::session::Session;
 use crate::source::{Replay, overview};
 use crate::window;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use umbriel_fields::Graph;
-use umbriel_render::{Gpu, Renderer};
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -47,29 +45,11 @@ fn compare(mut replay: Replay) -> Result<usize, Failure> {
 }
 
 fn draw(replay: Replay, args: &cli::Replay, out: &Path) -> Result<usize, Failure> {
-    let (first, frames) = (replay.position(), replay.frames());
+    let frames = replay.position() as u32..replay.frames() as u32;
     let mut session = Session::replay(replay, &args.file);
-    let gpu = Gpu::new(None)?;
-    let mut renderer = Renderer::new(&gpu)?;
-    let bar = headless::progress((frames - first) as u32, "frames");
-    let mut problems = 0;
-    for frame in first..frames {
-        session.step(0.0);
-        let pictures = headless::pictures(&mut session, args.view.as_deref(), args.size)?;
-        renderer.render(session.scene(), &pictures)?;
-        for (place, picture) in pictures.iter().enumerate() {
-            let name = (pictures.len() > 1).then_some(picture.name.as_str());
-            let path: PathBuf = headless::numbered(out, name, Some(frame as u32));
-            png::write(&path, &png::row(&renderer.read_back(place)?), &headless::describe(&gpu))?;
-        }
-        for problem in session.problems().into_iter().chain(renderer.problems()) {
-            bar.suspend(|| tracing::error!("{problem}"));
-            problems += 1;
-        }
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
-    Ok(problems)
+    let wanted = headless::Wanted { view: args.view.as_deref(), size: args.size, out };
+    // A recording has its own times.
+    Ok(headless::draw(&mut session, frames, |_| 0.0, &wanted)?.problems)
 }
 
 /// Tells why a field holds what it holds, what nodes cost, or what is in the recording.
