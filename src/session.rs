@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use umbriel_displays::WindowSizes;
 use umbriel_displays::navigation::{Input, NavigationNode};
 use umbriel_displays::rig::{Rig, Wanted};
-use umbriel_fields::Graph;
+use umbriel_fields::{Graph, NodeId};
 use umbriel_scene::{Aabb, Picture, Scene};
 use umbriel_scenegraph::{Extractor, Viewpoint};
 use umbriel_scripts::World;
@@ -115,7 +115,8 @@ impl Session {
             self.rig.refit();
         }
         self.extractor.update(self.source.graph(), &mut self.scene);
-        self.problems.extend(self.extractor.problems().iter().map(ToString::to_string));
+        let problems = self.extractor.problems();
+        self.problems.extend(problems.iter().map(|problem| placed(&self.source, Some(problem.node), problem)));
     }
 
     /// What the displays show, or the named display or viewpoint. `size` is that of a desktop's picture, `windows` that of
@@ -129,7 +130,11 @@ impl Session {
         let bounds = bounds(&self.scene).transformed(&self.extractor.world_from_room());
         let wanted = Wanted { view, size, windows };
         let found = self.rig.pictures(self.source.graph(), self.extractor.viewpoints(), &bounds, &wanted)?;
-        self.problems.extend(found.problems.iter().map(ToString::to_string));
+        let node = |problem: &umbriel_displays::Error| match problem {
+            umbriel_displays::Error::Rig { node, .. } => self.source.graph().find(node),
+            _ => None,
+        };
+        self.problems.extend(found.problems.iter().map(|problem| placed(&self.source, node(problem), problem)));
         Ok(found.pictures)
     }
 
@@ -236,6 +241,14 @@ impl Session {
     /// Problems since this was last called.
     pub(crate) fn problems(&mut self) -> Vec<String> {
         std::mem::take(&mut self.problems)
+    }
+}
+
+/// A problem with the place in the script where its node was made.
+fn placed(source: &Source, node: Option<NodeId>, problem: &impl std::fmt::Display) -> String {
+    match node.and_then(|node| source.made_at(node)) {
+        Some((file, line, column)) => format!("{file}:{line}:{column}: {problem}"),
+        None => problem.to_string(),
     }
 }
 

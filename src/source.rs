@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use umbriel_fields::record::{Divergence, Options, RecordError, Recorder, Replayer, Summary, summary};
-use umbriel_fields::{Graph, NodeType, TypeRegistry, builtin_types};
+use umbriel_fields::{Graph, NodeId, NodeType, TypeRegistry, builtin_types};
 use umbriel_scripts::World;
 
 /// Why a recording cannot be made or used: the file, and the reason.
@@ -37,6 +37,14 @@ impl Source {
         match self {
             Source::World(world) => world.graph_mut(),
             Source::Replay(replay) => &mut replay.graph,
+        }
+    }
+
+    /// Where a script made a node: file, line and column.
+    pub(crate) fn made_at(&self, node: NodeId) -> Option<(String, usize, usize)> {
+        match self {
+            Source::World(world) => world.made_at(node),
+            Source::Replay(_) => None,
         }
     }
 

@@ -44,38 +44,38 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
         (
             "nan_transform",
             r#"world.add(transform(#{ name: "lost", translation: vec3(0.0/0.0, 0, 0) }, [shape(make("Box"))]));"#,
-            &["lost"],
+            &["nan_transform.rhai:4:11", "lost"],
         ),
-        ("empty_mesh", r#"let m = make("Mesh"); m.name = "nothing"; world.add(shape(m));"#, &["nothing"]),
+        ("empty_mesh", r#"let m = make("Mesh"); m.name = "nothing"; world.add(shape(m));"#, &["empty_mesh.rhai:4:9", "nothing"]),
         (
             "index_out_of_range",
             r#"let m = make("Mesh", #{ position: [vec3(0,0,0), vec3(1,0,0), vec3(0,1,0)], index: [0, 1, 7] }); m.name = "torn"; world.add(shape(m));"#,
-            &["torn", "7"],
+            &["index_out_of_range.rhai:4", "torn", "7"],
         ),
         (
             "map_of_size_0",
             r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "map", shadow_size: 0 }));"#,
-            &["sun", "shadow_size"],
+            &["map_of_size_0.rhai:4:11", "sun", "shadow_size"],
         ),
         (
             "near_behind_far",
             r#"world.add(make("SpotLight", #{ name: "spot", shadows: "map", shadow_near_far: vec2(5.0, 1.0) }));"#,
-            &["spot", "shadow_near_far"],
+            &["near_behind_far.rhai:4", "spot", "shadow_near_far"],
         ),
         (
             "missing_texture",
             r#"world.add(shape(make("Box"), make("PhysicalMaterial", #{ base_texture: make("ImageTexture", #{ url: "no.png" }) })));"#,
-            &["no.png"],
+            &["missing_texture.rhai:4", "no.png"],
         ),
         (
             "lightless_stencil",
             r#"world.add(make("StencilShadow", #{ name: "group", caster: [shape(make("Box"))] }));"#,
-            &["group", "light"],
+            &["lightless_stencil.rhai:4", "group", "light"],
         ),
         (
             "flat_screen",
             r#"make("Display", #{ name: "wall", screens: [make("Screen", #{ name: "flat", lower_left: vec3(0,0,0), lower_right: vec3(0,0,0), upper_left: vec3(0,1,0) })], user: make("User") });"#,
-            &["flat", "no area"],
+            &["flat_screen.rhai:4:49", "flat", "no area"],
         ),
     ];
     for (name, line, expected) in rows {

@@ -101,7 +101,7 @@ pub(crate) fn evaluate(script: &Script, graph: &mut Graph, node: NodeId) {
     };
     let fault = Fault { message: format!("{message}; it is switched off until its code changes"), node: None, field: None };
     let fault = Fault { node: Some(graph.describe(node)), field: Some(field.into()), ..fault };
-    let place = stage.made_at.borrow().get(&node).copied().unwrap_or(rhai::Position::NONE);
+    let place = stage.made_at(node).unwrap_or(rhai::Position::NONE);
     crate::engine::report(stage, fault, place);
     stage.failed_code.borrow_mut().insert(node, code);
 }

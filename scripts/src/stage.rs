@@ -72,8 +72,10 @@ pub(crate) struct Stage {
     pub(crate) property_names: PropertyNames,
     /// The constants of the main script while it runs, for Expressions that it makes.
     pub(crate) running_constants: RefCell<BTreeMap<ImmutableString, Dynamic>>,
-    /// Where Expressions were made.
-    pub(crate) made_at: RefCell<HashMap<NodeId, Position>>,
+    /// Where nodes were made, as far as it is known.
+    places: RefCell<HashMap<NodeId, Position>>,
+    /// Where nodes are being made.
+    making_at: Cell<Position>,
     /// The text of an Expression that failed.
     pub(crate) failed_code: RefCell<HashMap<NodeId, Arc<str>>>,
     /// True while an Expression is computed: it sees its inputs only.
@@ -110,7 +112,8 @@ impl Stage {
             functions: RefCell::new(AST::empty()),
             property_names: PropertyNames::default(),
             running_constants: RefCell::default(),
-            made_at: RefCell::default(),
+            places: RefCell::default(),
+            making_at: Cell::new(Position::NONE),
             failed_code: RefCell::default(),
             alone: Cell::new(false),
             at_console: Cell::new(false),
@@ -165,13 +168,31 @@ impl Stage {
         }
     }
 
+    /// Makes nodes of which is known where in the script they were made.
+    pub(crate) fn making_at<T>(&self, position: Position, make: impl FnOnce() -> Outcome<T>) -> Outcome<T> {
+        self.write(|graph| self.set_origin(graph, position));
+        let before = self.making_at.replace(position);
+        let made = make();
+        self.making_at.set(before);
+        made
+    }
+
+    /// Where a node was made.
+    pub(crate) fn made_at(&self, node: NodeId) -> Option<Position> {
+        self.places.borrow().get(&node).copied()
+    }
+
     /// A new node, within the limit of nodes. A type that a script defined gets its handlers.
     pub(crate) fn create(&self, type_name: &str) -> Outcome<Node> {
         self.may_change()?;
         if self.read(Graph::node_count) >= self.limits.nodes {
             return fail(format!("the world has {} nodes already, and more are not allowed", self.limits.nodes));
         }
-        self.create_defined(type_name)
+        let node = self.create_defined(type_name)?;
+        if !self.making_at.get().is_none() {
+            self.places.borrow_mut().insert(node.0, self.making_at.get());
+        }
+        Ok(node)
     }
 
     pub(crate) fn delete(&self, node: Node) -> Outcome<()> {
@@ -180,7 +201,7 @@ impl Stage {
         self.write(|graph| graph.delete(node.0)).map_err(|e| self.fault(e, &label, None))?;
         self.on_change.borrow_mut().retain(|_, handler| handler.field.node != node.0);
         self.behaviours.borrow_mut().remove(&node.0);
-        self.made_at.borrow_mut().remove(&node.0);
+        self.places.borrow_mut().remove(&node.0);
         self.failed_code.borrow_mut().remove(&node.0);
         self.switched_off.borrow_mut().remove(&node.0);
         let mut bytes = self.field_bytes.borrow_mut();

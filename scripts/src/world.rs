@@ -168,6 +168,12 @@ impl World {
         }
     }
 
+    /// Where the script made a node: file relative to the world's folder, line and column, both from 1.
+    pub fn made_at(&self, node: NodeId) -> Option<(String, usize, usize)> {
+        let stage = &self.script.stage;
+        Some(stage.source.borrow().place(stage.made_at(node)?))
+    }
+
     /// Problems of nodes become problems of the world, each once, however often it is reported.
     fn take_over(&mut self, problems: Vec<umbriel_fields::Problem>) {
         const REMEMBERED: usize = 10_000;
@@ -176,9 +182,7 @@ impl World {
             let label = self.graph.contains(node).then(|| self.graph.describe(node));
             let declared = field.and_then(|field| self.graph.declaration(field).ok()).map(|field| field.name.to_string());
             if self.told.len() < REMEMBERED && self.told.insert((node, message.clone())) {
-                let place = self.script.stage.made_at.borrow().get(&node).copied();
-                let (file, line, column) =
-                    place.map_or((file.clone(), 0, 0), |place| self.script.stage.source.borrow().place(place));
+                let (file, line, column) = self.made_at(node).unwrap_or((file.clone(), 0, 0));
                 self.problems.push(Problem { message, file, line, column, node: label, field: declared, calls: Vec::new() });
             }
         }

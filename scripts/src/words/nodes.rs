@@ -22,23 +22,25 @@ pub(super) fn teach(words: &mut Words<'_>) {
 fn make(words: &mut Words<'_>) {
     words.engine.register_type_with_name::<Node>("Node");
     let stage = words.stage.clone();
-    words.word("make(type: string) -> Node", "A node of a type, with the type's defaults.", move |name: &str| stage.create(name));
+    words.word(
+        "make(type: string) -> Node",
+        "A node of a type, with the type's defaults.",
+        move |context: NativeCallContext<'_>, name: &str| stage.making_at(context.call_position(), || stage.create(name)),
+    );
     let stage = words.stage.clone();
     words.word(
         "make(type: string, fields: map) -> Node",
         "A node with fields set: `make(\"Box\", #{ size: vec3(1, 2, 1) })`. The entry `name` names it. An Expression \
          takes `inputs`, `code` and `value`: `make(\"Expression\", #{ inputs: #{ a: 1.0 }, code: \"a * 2\" })`.",
         move |context: NativeCallContext<'_>, name: &str, fields: Map| {
-            let position = context.call_position();
-            stage.write(|graph| stage.set_origin(graph, position));
-            if umbriel_fields::canonical(name) != umbriel_fields::canonical(EXPRESSION) {
-                return make_with(&stage, name, &fields);
-            }
-            let outer = context.global_runtime_state().constants.clone();
-            *stage.running_constants.borrow_mut() = outer.map(|known| known.borrow().clone()).unwrap_or_default();
-            let node = expression::make(&stage, context.engine(), &fields)?;
-            stage.made_at.borrow_mut().insert(node.0, position);
-            Ok(node)
+            stage.making_at(context.call_position(), || {
+                if umbriel_fields::canonical(name) != umbriel_fields::canonical(EXPRESSION) {
+                    return make_with(&stage, name, &fields);
+                }
+                let outer = context.global_runtime_state().constants.clone();
+                *stage.running_constants.borrow_mut() = outer.map(|known| known.borrow().clone()).unwrap_or_default();
+                expression::make(&stage, context.engine(), &fields)
+            })
         },
     );
     let stage = words.stage.clone();

@@ -1,7 +1,7 @@
 //! Screens of common installations, as nodes.
 
 use glam::Vec3;
-use rhai::{Array, Dynamic, Map};
+use rhai::{Array, Dynamic, Map, NativeCallContext};
 use umbriel_scenegraph::screens::{ScreenCorners, cylinder_screens, room_screens};
 
 use super::Words;
@@ -16,7 +16,7 @@ pub(super) fn teach(words: &mut Words<'_>) {
         "cylinder_screens(channels: int, angle: number, radius: number, height: number, middle: number) -> array",
         "Flat Screens around the origin from left to right, edge to edge, over an angle in radians; `middle` is the height of their \
          middle. Seven over 270 degrees are the ship simulator of 001.",
-        move |channels: i64, angle: Dynamic, radius: Dynamic, height: Dynamic, middle: Dynamic| -> Outcome<Array> {
+        move |context: NativeCallContext<'_>, channels: i64, angle: Dynamic, radius: Dynamic, height: Dynamic, middle: Dynamic| -> Outcome<Array> {
             let [angle, radius, height, middle] =
                 [component(&angle)?, component(&radius)?, component(&height)?, component(&middle)?];
             let screens = match usize::try_from(channels) {
@@ -26,16 +26,17 @@ pub(super) fn teach(words: &mut Words<'_>) {
             if screens.is_empty() {
                 return fail("a cylinder has from 1 to 64 screens of less than 180 degrees each");
             }
-            screens.iter().map(|corners| screen(&stage, corners)).collect()
+            stage.making_at(context.call_position(), || screens.iter().map(|corners| screen(&stage, corners)).collect())
         },
     );
     let stage = words.stage.clone();
     words.word(
         "room_screens(width: number, height: number, depth: number) -> array",
         "Four Screens: left, front and right wall and the floor of a room that is open to the back, its floor around the origin.",
-        move |width: Dynamic, height: Dynamic, depth: Dynamic| -> Outcome<Array> {
+        move |context: NativeCallContext<'_>, width: Dynamic, height: Dynamic, depth: Dynamic| -> Outcome<Array> {
             let room = room_screens(component(&width)?, component(&height)?, component(&depth)?);
-            [room.left, room.front, room.right, room.floor].iter().map(|corners| screen(&stage, corners)).collect()
+            let screens = [room.left, room.front, room.right, room.floor];
+            stage.making_at(context.call_position(), || screens.iter().map(|corners| screen(&stage, corners)).collect())
         },
     );
 }
