@@ -75,7 +75,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
         (
             "flat_screen",
             r#"make("Display", #{ name: "wall", screens: [make("Screen", #{ name: "flat", lower_left: vec3(0,0,0), lower_right: vec3(0,0,0), upper_left: vec3(0,1,0) })], user: make("User") });"#,
-            &["flat_screen.rhai:4:49", "flat", "no area"],
+            &["flat_screen.rhai:4:44", "flat", "no area"],
         ),
     ];
     for (name, line, expected) in rows {
