@@ -8,8 +8,9 @@ use std::sync::Arc;
 use umbriel_scene::Aabb;
 use wgpu::util::DeviceExt;
 
-/// WGSL of this pass: the shared ways from vertices to the screen, then its own.
-pub(super) const SHADER: &str = concat!(include_str!("../shaders/position.wgsl"), include_str!("extract.wgsl"));
+/// WGSL of this pass: the shared ways from vertices to the screen, what casts, then its own.
+pub(super) const SHADER: &str =
+    concat!(include_str!("../shaders/position.wgsl"), include_str!("caster.wgsl"), include_str!("extract.wgsl"));
 
 const EVERY_TRIANGLE: u32 = 1;
 const MIRRORED: u32 = 2;

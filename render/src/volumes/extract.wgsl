@@ -1,19 +1,6 @@
 // The volume of one caster under one light: lists of indices and the arguments of the draws that read them.
 // Vertex i of the mesh is index 2i where it is and 2i + 1 thrown to infinity, away from the light.
 
-const EVERY_TRIANGLE = 1u;
-const MIRRORED = 2u;
-
-struct Caster {
-    world_from_object: mat4x4<f32>,
-    // w = 1: position of the light. w = 0: direction towards it.
-    toward_light: vec4<f32>,
-    triangle_count: u32,
-    edge_count: u32,
-    flags: u32,
-    unused: u32,
-};
-
 struct Draw {
     index_count: atomic<u32>,
     instance_count: u32,
@@ -29,51 +16,15 @@ struct Draws {
     turned_caps: Draw,
 };
 
-@group(0) @binding(0) var<uniform> caster: Caster;
-@group(0) @binding(1) var<storage, read> positions: array<f32>;
-// Three vertices, and how its component is oriented: 1 outward, 2 inward, 0 not closed.
-@group(0) @binding(2) var<storage, read> triangles: array<vec4<u32>>;
-// Two vertices a and b, place and number of its incidences.
-@group(0) @binding(3) var<storage, read> edges: array<vec4<u32>>;
-// Triangle << 1, plus 1 where the triangle runs from b to a.
-@group(0) @binding(4) var<storage, read> incidences: array<u32>;
 // What each triangle casts: 1 as authored, -1 turned over, 0 nothing.
 @group(0) @binding(5) var<storage, read_write> casts: array<i32>;
 @group(0) @binding(6) var<storage, read_write> draws: Draws;
 @group(0) @binding(7) var<storage, read_write> indices: array<u32>;
 
-fn vertex_in_world(i: u32) -> vec3<f32> {
-    let p = vec3<f32>(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]);
-    return world_from_vertex(caster.world_from_object, p).xyz;
-}
-
-fn item(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
-    return (group.y * groups.x + group.x) * 64u + local;
-}
-
 fn put(at: u32, a: u32, b: u32, c: u32) {
     indices[at] = a;
     indices[at + 1u] = b;
     indices[at + 2u] = c;
-}
-
-// The one decision: 1 where the light sees the triangle counter-clockwise, -1 clockwise, 0 edge-on or degenerate.
-// Taken in the world, so that mirrored and flattening matrices need no care.
-fn facing(t: vec4<u32>) -> i32 {
-    let a = vertex_in_world(t.x);
-    let n = cross(vertex_in_world(t.y) - a, vertex_in_world(t.z) - a);
-    let d = dot(n, caster.toward_light.xyz - caster.toward_light.w * a);
-    return select(select(0, -1, d < 0.0), 1, d > 0.0);
-}
-
-// Whether a triangle that the light sees as `f` throws a volume. Of a closed component the side towards the light is
-// enough while the light is outside; everything else throws with both sides.
-fn contributes(t: vec4<u32>, f: i32) -> bool {
-    if (caster.flags & EVERY_TRIANGLE) != 0u || t.w == 0u {
-        return true;
-    }
-    let inward = (t.w == 2u) != ((caster.flags & MIRRORED) != 0u);
-    return f == select(1, -1, inward);
 }
 
 @compute @workgroup_size(64)

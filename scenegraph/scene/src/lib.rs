@@ -29,5 +29,5 @@ pub use mesh::{Mesh, MeshError, MorphTarget, Topology};
 pub use scene::{Background, Drawable, Film, Fog, FogKind, Pose, Scene, StencilGroup, StencilMode};
 pub use score::{Score, difference, score};
 pub use tangents::tangents;
-pub use trace::{Mask, MaskError, TraceError, TraceOptions, Tracer, trace_visibility};
+pub use trace::{Mask, MaskError, PenumbraScore, Shares, TraceError, TraceOptions, Tracer, trace_visibility};
 pub use view::{Frustum, Layout, Picture, PictureKind, Rect, View};

@@ -28,6 +28,11 @@ pub struct Light {
     pub shadows: ShadowMethod,
     /// Share of the light that a shadow takes away, 0..=1.
     pub shadow_intensity: f32,
+    /// Size of the source, from which penumbrae follow: of a directional light the tangent of half the angle under which
+    /// it is seen, of the others the radius, metres. The sun's is [`Light::SUN_SIZE`].
+    pub size: f32,
+    /// Its shadow volumes have penumbrae (004).
+    pub soft: bool,
     /// Settings of the shadow map, read when `shadows` is [`ShadowMethod::Map`].
     pub map: MapSettings,
 }
@@ -104,6 +109,11 @@ impl Default for MapSettings {
     }
 }
 
+impl Light {
+    /// Tangent of half the angle under which the sun is seen (0.533 degrees).
+    pub const SUN_SIZE: f32 = 0.00465;
+}
+
 impl Default for Light {
     fn default() -> Light {
         Light {
@@ -118,6 +128,8 @@ impl Default for Light {
             range: f32::INFINITY,
             shadows: ShadowMethod::None,
             shadow_intensity: 1.0,
+            size: 0.0,
+            soft: false,
             map: MapSettings::default(),
         }
     }

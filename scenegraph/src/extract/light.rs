@@ -33,6 +33,7 @@ pub(super) fn read_light(graph: &Graph, node: NodeId, problems: &mut Problems) -
         ambient_intensity: check.finite("ambient_intensity", read.get("ambient_intensity"), 0.0, |x: &f32| x.is_finite()),
         shadows: shadows(&read),
         shadow_intensity: check.finite("shadow_intensity", read.get("shadow_intensity"), 1.0, |x: &f32| x.is_finite()),
+        soft: read.choice("soft") != 0,
         ..Light::default()
     };
     match &*graph.type_of(node).name {
@@ -60,8 +61,29 @@ pub(super) fn read_light(graph: &Graph, node: NodeId, problems: &mut Problems) -
         let fine = |a: &Vec3| a.is_finite() && a.min_element() >= 0.0 && a.max_element() > 0.0;
         light.attenuation = check.finite("attenuation", read.get("attenuation"), Vec3::Z, fine);
     }
+    light.shadow_intensity *= 1.0 - brightness(&read, &mut check);
+    light.size = size(&read, parallel, &mut check);
     light.map = map_settings(&read, parallel, &mut check);
     Some(light)
+}
+
+/// Share of the light that a shadow of this grey keeps: 004 gives greys as they are shown, sRGB encoded.
+fn brightness(read: &Reader<'_>, check: &mut Check<'_>) -> f32 {
+    let grey = check.finite("shadow_brightness", read.get("shadow_brightness"), 0.0, |b: &f32| (0.0..=255.0).contains(b)) / 255.0;
+    if grey <= 0.04045 { grey / 12.92 } else { ((grey + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Size of the source as [`Light::size`]. A range of 10 is the factor 0.1 of 004 section 3.2.1.
+fn size(read: &Reader<'_>, parallel: bool, check: &mut Check<'_>) -> f32 {
+    let fine = |x: &f32| x.is_finite() && *x >= 0.0;
+    let by_range = check.finite("soft_range", read.get("soft_range"), 10.0, fine) / 100.0;
+    let by_size = if parallel {
+        let angle = |x: &f32| (0.0..3.0).contains(x);
+        (check.finite("angular_diameter", read.get("angular_diameter"), 0.0093, angle) * 0.5).tan()
+    } else {
+        check.finite("light_radius", read.get("light_radius"), 0.05, fine)
+    };
+    if read.choice("soft") == 2 { by_range } else { by_size }
 }
 
 /// The light of Performer (000 section 4.1): the position's w tells its kind.
@@ -147,6 +169,9 @@ pub(super) fn place_light(local: &Light, room_from_local: &Mat4, world_per_room:
         return None;
     }
     light.range *= stretch;
+    if local.kind != LightKind::Directional {
+        light.size *= stretch;
+    }
     // A world seen ten times smaller is as bright: distances count in metres of the world.
     light.attenuation *= Vec3::new(1.0, world_per_room, world_per_room * world_per_room);
     let scaled = |v: f32| v * stretch;

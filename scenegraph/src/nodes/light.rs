@@ -17,6 +17,14 @@ fn common(intensity: f32, unit: &'static str) -> Vec<Field> {
         Field::choice("shadows", &["none", "map", "volume"], "none").doc("How it casts shadows; true is map."),
         Field::new("shadow_enable", false).doc("Casts shadows by a map, where `shadows` is none (000 section 4.1)."),
         Field::new("shadow_intensity", 1.0f32).range(0.0, 1.0).doc("Share of the light that a shadow takes away."),
+        Field::new("shadow_brightness", 0.0f32)
+            .range(0.0, 255.0)
+            .doc("Grey of the shadow where a white sheet beside it is 255 (004 Table 2); 0: as dark as `shadow_intensity` says."),
+        Field::choice("soft", &["none", "size", "range"], "none")
+            .doc("Penumbrae of shadow volumes (004), from the light's size or from `soft_range`; true is size."),
+        Field::new("soft_range", 10.0f32)
+            .unit("cm/m")
+            .doc("With `soft` range: how much farther out the shadow ends per metre behind the caster; 0 is hard (004 Table 2)."),
         Field::new("shadow_size", 2048i32).unit("texels").doc("Side of the shadow map."),
         Field::new("shadow_frustum", Vec4::ZERO)
             .alias("shadow_frust")
@@ -52,9 +60,23 @@ fn radius() -> Field {
     Field::new("radius", f32::INFINITY).unit("m").alias("range").doc("No effect beyond this distance.")
 }
 
+/// The sun's mean diameter.
+const SUN_RAD: f32 = 0.0093;
+
+fn angular_diameter() -> Field {
+    Field::new("angular_diameter", SUN_RAD).unit("rad").doc("Angle under which the source is seen; penumbrae follow from it.")
+}
+
+fn light_radius() -> Field {
+    Field::new("light_radius", 0.05f32).unit("m").doc("Radius of the source; penumbrae follow from it.")
+}
+
 pub(super) fn types() -> Vec<NodeType> {
     vec![
-        NodeType::new("DirectionalLight", "Parallel light, such as the sun's.").field(direction()).fields(common(PI, "lx")),
+        NodeType::new("DirectionalLight", "Parallel light, such as the sun's.")
+            .field(direction())
+            .field(angular_diameter())
+            .fields(common(PI, "lx")),
         NodeType::new("SpotLight", "A cone of light.")
             .field(place("location").alias("position"))
             .field(direction().alias("spot_dir"))
@@ -62,11 +84,13 @@ pub(super) fn types() -> Vec<NodeType> {
             .field(Field::new("beam_width", 0.589f32).unit("rad").range(0.0, f64::from(std::f32::consts::PI)).doc("Half angle of full brightness."))
             .field(attenuation(Vec3::Z))
             .field(radius())
+            .field(light_radius())
             .fields(common(100.0, "cd")),
         NodeType::new("PointLight", "Light into all directions.")
             .field(place("location").alias("position"))
             .field(attenuation(Vec3::Z))
             .field(radius())
+            .field(light_radius())
             .fields(common(100.0, "cd")),
         NodeType::new("LightSource", "The light of OpenGL Performer and AVANGO (000 section 4.1): its place decides its kind.")
             .alias("fpLightSource")
@@ -80,6 +104,8 @@ pub(super) fn types() -> Vec<NodeType> {
             ))
             .field(attenuation(Vec3::X))
             .field(radius())
+            .field(light_radius())
+            .field(angular_diameter())
             .fields(common(PI, "cd")),
     ]
 }

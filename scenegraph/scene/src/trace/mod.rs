@@ -4,12 +4,14 @@
 //! bias but the offset of shadow rays. It does not shade.
 
 mod alpha;
+mod area;
 mod beam;
 mod camera;
 mod mask;
 mod ray;
 mod triangles;
 
+pub use area::{PenumbraScore, Shares};
 pub use mask::{Mask, MaskError};
 
 use crate::{Light, Scene, View};
@@ -108,25 +110,7 @@ impl Tracer {
         let camera = Camera::new(view, options.sub_samples.max(1))?;
         let [width, height] = view.size;
         let mut mask = Mask::background(width, height);
-        let done = AtomicU32::new(0);
-        let rows = Mutex::new((0u32..).zip(mask.classes.chunks_mut((width as usize).max(1))));
-        let work = || {
-            loop {
-                // The guard must not live while the row is traced.
-                let next = rows.lock().unwrap_or_else(|e| e.into_inner()).next();
-                let Some((y, row)) = next else { break };
-                for (x, class) in (0..).zip(row) {
-                    *class = self.pixel(&camera, [x, y], &beam, options);
-                }
-                progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-            }
-        };
-        std::thread::scope(|scope| {
-            for _ in 1..std::thread::available_parallelism().map_or(1, |n| n.get()) {
-                scope.spawn(work);
-            }
-            work();
-        });
+        by_rows(&mut mask.classes, width, progress, |pixel| self.pixel(&camera, pixel, &beam, options));
         Ok(mask)
     }
 
@@ -139,7 +123,18 @@ impl Tracer {
 
     /// The class of what a ray from `eye` along the unit vector `direction` meets.
     fn classify(&self, eye: DVec3, direction: DVec3, beam: &Beam, options: &TraceOptions) -> u8 {
-        let Some(hit) = self.first_seen(&Ray::new(eye, direction), options.cull) else { return Mask::BACKGROUND };
+        let Some(place) = self.place(eye, direction, beam, options) else { return Mask::BACKGROUND };
+        let may_be_dark = place.class == Mask::LIT && place.receives;
+        let shadow = Ray::new(place.start, place.to_light);
+        if may_be_dark && self.is_blocked(&shadow, place.far - 2.0 * place.eps, options.blend_casts) {
+            return Mask::SHADOW;
+        }
+        place.class
+    }
+
+    /// What a ray from `eye` along the unit vector `direction` meets, as if nothing cast shadows.
+    fn place(&self, eye: DVec3, direction: DVec3, beam: &Beam, options: &TraceOptions) -> Option<Place> {
+        let hit = self.first_seen(&Ray::new(eye, direction), options.cull)?;
         let triangle = &self.soup.triangles[hit.triangle];
         let normal = triangle.normal();
         // Once more against the plane: the hit's own distance comes from barycentrics.
@@ -147,16 +142,16 @@ impl Tracer {
         let point = eye + direction * distance;
         let facing = if normal.dot(direction) > 0.0 { -normal } else { normal };
         let (to_light, far) = beam.to_light(point, facing);
-        if beam.is_outside_of_cone(to_light) {
-            return Mask::OUTSIDE;
-        }
-        if facing.dot(to_light) <= options.graze {
-            return Mask::AWAY;
-        }
+        let class = if beam.is_outside_of_cone(to_light) {
+            Mask::OUTSIDE
+        } else if facing.dot(to_light) <= options.graze {
+            Mask::AWAY
+        } else {
+            Mask::LIT
+        };
         let eps = self.soup.diagonal() * options.eps_scale;
-        let shadow = Ray::new(point + facing * eps, to_light);
         let receives = self.soup.shapes[triangle.shape as usize].receives;
-        if receives && self.is_blocked(&shadow, far - 2.0 * eps, options.blend_casts) { Mask::SHADOW } else { Mask::LIT }
+        Some(Place { class, to_light, far, start: point + facing * eps, eps, receives })
     }
 
     /// The first triangle along the ray that the eye sees.
@@ -174,6 +169,44 @@ impl Tracer {
             shape.casts && (blend_casts || !shape.blend) && self.soup.is_there(hit)
         })
     }
+}
+
+/// Where a ray ended, and what there is to know about the light there.
+struct Place {
+    /// Lit, away or outside.
+    class: u8,
+    /// Unit vector.
+    to_light: DVec3,
+    /// Distance of the light, metres.
+    far: f64,
+    /// Where shadow rays start.
+    start: DVec3,
+    /// Distance of the start from the surface, metres.
+    eps: f64,
+    receives: bool,
+}
+
+/// Computes every pixel, row by row, on all cores. `progress` hears the number of rows that are done.
+fn by_rows<T: Send>(pixels: &mut [T], width: u32, progress: &(dyn Fn(u32) + Sync), pixel: impl Fn([u32; 2]) -> T + Sync) {
+    let done = AtomicU32::new(0);
+    let rows = Mutex::new((0u32..).zip(pixels.chunks_mut((width as usize).max(1))));
+    let work = || {
+        loop {
+            // The guard must not live while the row is traced.
+            let next = rows.lock().unwrap_or_else(|e| e.into_inner()).next();
+            let Some((y, row)) = next else { break };
+            for (x, place) in (0..).zip(row) {
+                *place = pixel([x, y]);
+            }
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..std::thread::available_parallelism().map_or(1, |n| n.get()) {
+            scope.spawn(work);
+        }
+        work();
+    });
 }
 
 #[cfg(test)]

@@ -327,3 +327,34 @@ fn progress_counts_every_row() {
     assert_eq!(mask, tracer.visibility(&sun(Vec3::NEG_Y), &view, &TraceOptions::default(), &|_| ()).unwrap());
     assert!(dvec3(0.0, 2.0, 2.0).distance(Camera::new(&view, 1).unwrap().eye) < 1e-6);
 }
+
+#[test]
+fn a_straight_edge_hides_the_segment_of_the_disc() {
+    // A half plane at height 4 over the ground under a light straight above: at x from the edge's foot the disc is cut at
+    // the distance x from its centre.
+    let sheet = drawable(square(), Mat4::from_translation(vec3(25.0, 4.0, 0.0)) * Mat4::from_scale(Vec3::splat(25.0)));
+    let world = scene(vec![ground(60.0), sheet]);
+    let high = vec3(0.0, 12.0, 0.0);
+    for (name, light, radius) in [
+        ("sun", Light { size: 0.1, ..sun(Vec3::NEG_Y) }, 0.4),
+        // A disc of 0.1 twice as far above the edge as the ground is below: half as large on the ground.
+        ("lamp", Light { size: 0.1, ..lamp(high) }, 0.05),
+    ] {
+        let tracer = Tracer::new(&world);
+        let beam = Beam::new(&light).unwrap();
+        let disc = super::area::disc(f64::from(light.size), 4096);
+        for x in [-1.5f64, -1.0, -0.7, -0.2, 0.0, 0.4, 0.9, 1.1] {
+            let (eye, target) = (dvec3(-9.0, 3.0, 0.0), dvec3(x * radius, 0.0, 0.0));
+            let found = tracer.share(eye, (target - eye).normalize(), &beam, &TraceOptions::default(), &disc).unwrap();
+            let cut = x.clamp(-1.0, 1.0);
+            let expected = (cut.acos() - cut * (1.0 - cut * cut).sqrt()) / std::f64::consts::PI;
+            assert!((found - expected).abs() < 0.01, "{name} {x}: {found} instead of {expected}");
+        }
+    }
+    let shares = Shares { width: 4, height: 1, shares: vec![None, Some(0.0), Some(0.5), Some(1.0)] };
+    let score = shares.score(&[9, 51, 255, 255]).unwrap();
+    assert_eq!((score.penumbra_pixels, score.pixels), (1, 3));
+    assert!((score.penumbra - 0.5).abs() < 1e-6 && (score.overall - 0.7 / 3.0).abs() < 1e-6, "{score:?}");
+    assert_eq!(shares.visibility(), [0, 0, 128, 255]);
+    assert!(shares.score(&[0; 3]).is_err());
+}

@@ -4,7 +4,7 @@ use super::{World, close3};
 use glam::{Quat, Vec2, Vec3, Vec4, vec2, vec3, vec4};
 use std::f32::consts::FRAC_PI_2;
 use umbriel_fields::Value;
-use umbriel_scene::{LightKind, ShadowMethod};
+use umbriel_scene::{Light, LightKind, ShadowMethod};
 
 #[test]
 fn lights_stand_where_the_graph_places_them() {
@@ -77,6 +77,36 @@ fn shadow_methods() {
 }
 
 #[test]
+fn sizes_of_sources() {
+    // Type, fields, size, softness, share that the shadow takes.
+    type Row = (&'static str, &'static [(&'static str, fn() -> Value)], f32, bool, f32);
+    let rows: [Row; 7] = [
+        ("DirectionalLight", &[], Light::SUN_SIZE, false, 1.0),
+        ("DirectionalLight", &[("soft", || true.into())], Light::SUN_SIZE, true, 1.0),
+        ("DirectionalLight", &[("soft", || "range".into())], 0.1, true, 1.0),
+        ("DirectionalLight", &[("soft", || "range".into()), ("soft_range", || 6.0f32.into())], 0.06, true, 1.0),
+        ("DirectionalLight", &[("angular_diameter", || 0.2f32.into())], 0.1f32.tan(), false, 1.0),
+        // The paper's greys are as they are shown: 128 of 255 is a good fifth of the light.
+        ("PointLight", &[("light_radius", || 0.2f32.into()), ("shadow_brightness", || 128.0f32.into())], 0.6, false, 0.784),
+        ("SpotLight", &[("shadow_intensity", || 0.5f32.into())], 0.15, false, 0.5),
+    ];
+    for (node_type, fields, size, soft, taken) in rows {
+        let mut w = World::new();
+        let t = w.below(&[w.root()], "Transform", "");
+        w.set(t, "scale", Vec3::splat(3.0));
+        let node = w.below(&[t], node_type, "");
+        for (field, value) in fields {
+            w.set(node, field, value());
+        }
+        w.update();
+        let light = w.light(node);
+        assert!((light.size - size).abs() < 1e-5, "{node_type} {}", light.size);
+        assert_eq!(light.soft, soft, "{node_type}");
+        assert!((light.shadow_intensity - taken).abs() < 1e-3, "{node_type} {}", light.shadow_intensity);
+    }
+}
+
+#[test]
 fn performers_light_source() {
     let rows = [
         (vec4(0.0, 2.0, 0.0, 0.0), vec2(0.0, 180.0), Vec3::ZERO, Vec3::NEG_Y, None),
@@ -105,7 +135,10 @@ fn performers_light_source() {
 #[test]
 fn settings_that_make_no_sense_are_reported_and_fitted() {
     let nan = f32::NAN;
-    let rows: [(&str, Value); 12] = [
+    let rows: [(&str, Value); 15] = [
+        ("soft_range", (-1.0f32).into()),
+        ("soft_range", nan.into()),
+        ("light_radius", (-0.1f32).into()),
         ("shadow_size", 0.into()),
         ("shadow_size", (-5).into()),
         ("shadow_near_far", Vec2::new(10.0, 1.0).into()),
