@@ -141,12 +141,16 @@ fn ron_from<T: DeserializeOwned>(text: &str) -> Result<T, (usize, String)> {
     ron::from_str(text).map_err(|error| (error.span.start.line.saturating_sub(1), error.code.to_string()))
 }
 
-fn bytes_from<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
-    match postcard::take_from_bytes(bytes) {
-        Ok((stored, [])) => Ok(stored),
-        Ok((_, rest)) => Err(format!("is followed by {} bytes too many", rest.len())),
-        Err(error) => Err(format!("cannot be read: {error}")),
-    }
+fn taken<T: DeserializeOwned>(bytes: &mut &[u8]) -> Result<T, String> {
+    let (stored, rest) = postcard::take_from_bytes(bytes).map_err(|error| format!("cannot be read: {error}"))?;
+    *bytes = rest;
+    Ok(stored)
+}
+
+/// Reads a value of a type that was written as bytes, and nothing else.
+pub(crate) fn from_bytes(mut bytes: &[u8], field_type: FieldType, field: &Field, find: &mut dyn Find) -> Result<Value, String> {
+    let value = take_value(&mut bytes, field_type, field, find)?;
+    if bytes.is_empty() { Ok(value) } else { Err(format!("is followed by {} bytes too many", bytes.len())) }
 }
 
 macro_rules! codec {
@@ -185,16 +189,16 @@ macro_rules! codec {
             )* }.unwrap_or_default()
         }
 
-        /// Reads a value of a type that was written as bytes.
-        pub(crate) fn from_bytes(
-            bytes: &[u8],
+        /// Takes a value of a type off the front of bytes.
+        pub(crate) fn take_value(
+            bytes: &mut &[u8],
             field_type: FieldType,
             field: &Field,
             find: &mut dyn Find,
         ) -> Result<Value, String> {
             match (field_type.kind, field_type.multiple) { $(
-                (Kind::$one, false) => <$type>::restore(bytes_from(bytes)?, field, find).map(Value::$one),
-                (Kind::$one, true) => bytes_from::<Vec<<$type as Plain>::Stored>>(bytes)?
+                (Kind::$one, false) => <$type>::restore(taken(bytes)?, field, find).map(Value::$one),
+                (Kind::$one, true) => taken::<Vec<<$type as Plain>::Stored>>(bytes)?
                     .into_iter()
                     .map(|stored| <$type>::restore(stored, field, find))
                     .collect::<Result<Arc<[$type]>, _>>()

@@ -38,6 +38,8 @@ pub struct Field {
     pub choices: Arc<[Arc<str>]>,
     /// Written by the node itself: not to be set by authors. Saved all the same: it may be what the node remembers.
     pub output: bool,
+    /// Stays in this process: replicas never learn of it, nor of routes to and from it.
+    pub local: bool,
 }
 
 impl Field {
@@ -55,6 +57,7 @@ impl Field {
             on_set: SetRule::Compare,
             choices: Arc::from([]),
             output: false,
+            local: false,
         }
     }
 
@@ -122,6 +125,12 @@ impl Field {
     /// Marks it as written by the node itself.
     pub fn output(mut self) -> Self {
         self.output = true;
+        self
+    }
+
+    /// Keeps it from replicas.
+    pub fn local(mut self) -> Self {
+        self.local = true;
         self
     }
 

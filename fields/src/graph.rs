@@ -53,6 +53,8 @@ pub(crate) struct Node {
     pub(crate) outgoing: Vec<crate::RouteId>,
     pub(crate) created: Revision,
     pub(crate) mode: Mode,
+    /// Stays in this process.
+    pub(crate) local: bool,
 }
 
 impl Node {
@@ -162,7 +164,7 @@ impl Graph {
     pub fn create_of(&mut self, node_type: Arc<NodeType>) -> NodeId {
         let created = self.changes.next();
         let type_of_new = node_type.clone();
-        let (mode, fields) = (node_type.mode, node_type.fields.len());
+        let (mode, local, fields) = (node_type.mode, node_type.local, node_type.fields.len());
         let id = self.nodes.insert(Node {
             node_type,
             name: None,
@@ -172,6 +174,7 @@ impl Graph {
             outgoing: Vec::new(),
             created,
             mode,
+            local,
         });
         let slot = slot_of(id);
         if self.ids.len() <= slot as usize {

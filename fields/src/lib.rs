@@ -41,6 +41,7 @@ mod program;
 mod propagate;
 pub mod record;
 mod registry;
+pub mod replica;
 mod route;
 pub mod save;
 mod schedule;

@@ -57,6 +57,8 @@ pub struct NodeType {
     pub evaluator: Evaluator,
     /// When it is evaluated.
     pub mode: Mode,
+    /// Nodes of this type stay in this process: replicas never learn of them.
+    pub local: bool,
     /// Canonical names and aliases of the fields.
     index: HashMap<Arc<str>, u16>,
     /// Names that two fields share; registration refuses them.
@@ -73,6 +75,7 @@ impl NodeType {
             fields: Vec::new(),
             evaluator: Evaluator::None,
             mode: Mode::OnChange,
+            local: false,
             index: HashMap::new(),
             clashes: Vec::new(),
         }
@@ -122,6 +125,12 @@ impl NodeType {
     /// Evaluated only when asked for.
     pub fn pull_only(mut self) -> Self {
         self.mode = Mode::Pull;
+        self
+    }
+
+    /// Keeps its nodes from replicas.
+    pub fn local(mut self) -> Self {
+        self.local = true;
         self
     }
 

@@ -104,6 +104,7 @@ impl Node {
             outgoing: Vec::new(),
             created: 0,
             mode: self.mode,
+            local: self.local,
         }
     }
 
@@ -119,6 +120,7 @@ impl Node {
             outgoing: Vec::new(),
             created: 0,
             mode,
+            local: false,
         }
     }
 }

@@ -1,0 +1,9 @@
+//! Replicas: whatever happens to a graph, its replicas are equal after each frame, and say where they are not.
+
+#[path = "../persistence/dice.rs"]
+mod dice;
+#[path = "../persistence/support.rs"]
+mod support;
+
+mod packets;
+mod random_worlds;

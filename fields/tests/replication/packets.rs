@@ -1,0 +1,191 @@
+//! Packets: what they cost, what travels once, and what bad ones are answered with.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use umbriel_fields::replica::{Bulk, Packet, Publisher, Replica, ReplicaError};
+use umbriel_fields::{Field, Graph, Image, NodeId, NodeType};
+
+use crate::support::types;
+
+fn replica_of(publisher: &mut Publisher, graph: &Graph, bulk: &mut Bulk) -> Replica {
+    let bytes = publisher.snapshot(graph).unwrap();
+    let packet = Packet::read(&bytes).unwrap();
+    for hash in packet.missing(bulk) {
+        bulk.learn(hash, &publisher.bulk(hash).unwrap()).unwrap();
+    }
+    Replica::new(&packet, types(), bulk).unwrap()
+}
+
+fn world() -> (Graph, NodeId) {
+    let mut graph = Graph::new(types());
+    let node = graph.create("All").unwrap();
+    graph.set_name(node, "mesh").unwrap();
+    (graph, node)
+}
+
+#[test]
+fn a_frame_costs_what_was_written() {
+    let mut graph = Graph::new(types());
+    let nodes: Vec<NodeId> = (0..1000).map(|_| graph.create("All").unwrap()).collect();
+    let mut publisher = Publisher::new();
+    publisher.frame(&graph);
+    let idle = publisher.frame(&graph).len();
+    assert!(idle < 64, "an idle frame has {idle} bytes");
+    for node in &nodes {
+        graph.set_named(*node, "vec3_one", Vec3::ONE).unwrap();
+    }
+    let bytes = publisher.frame(&graph).len();
+    assert!(bytes < idle + 1000 * 18 + 32, "12 bytes of a vector and 6 of its place: {bytes}");
+}
+
+#[test]
+fn long_values_and_images_travel_once() {
+    let (mut graph, node) = world();
+    let image = Arc::new(Image { width: 64, height: 64, rgba: vec![7; 64 * 64 * 4].into() });
+    let points: Vec<Vec3> = (0..10_000).map(|n| Vec3::splat(n as f32)).collect();
+    graph.set_named(node, "vec3_many", points.clone()).unwrap();
+    graph.set_named(node, "image_one", image.clone()).unwrap();
+    let mut publisher = Publisher::new();
+    let first = publisher.frame(&graph);
+    let mut bulk = Bulk::new();
+    assert_eq!(Packet::read(&first).unwrap().missing(&bulk).len(), 2);
+    assert!(first.len() < 8000, "the values themselves are elsewhere: {}", first.len());
+    let replica = replica_of(&mut publisher, &graph, &mut bulk);
+    // Another node with the same content, and who comes back: nothing is missing.
+    let twin = graph.create("All").unwrap();
+    graph.set_named(twin, "vec3_many", points).unwrap();
+    graph.set_named(twin, "image_one", Arc::new(Image::clone(&image))).unwrap();
+    let second = publisher.frame(&graph);
+    assert_eq!(Packet::read(&second).unwrap().missing(&bulk), []);
+    let again = replica_of(&mut publisher, &graph, &mut bulk);
+    let picture = |replica: &Replica| {
+        let node = replica.graph().find("mesh").unwrap();
+        replica.graph().get_named::<Option<Arc<Image>>>(node, "image_one").unwrap().unwrap()
+    };
+    assert!(Arc::ptr_eq(&picture(&replica), &picture(&again)), "caches of a GPU go by identity: it stays");
+    // What changes every frame goes as it is.
+    for frame in 0..3 {
+        graph.set_named(node, "vec3_many", vec![Vec3::splat(frame as f32); 5000]).unwrap();
+        let bytes = publisher.frame(&graph);
+        assert_eq!(Packet::read(&bytes).unwrap().missing(&bulk), []);
+    }
+    // Nobody holds the first list any more but the twin; both are offered still, for who was slow.
+    graph.delete(node).unwrap();
+    graph.delete(twin).unwrap();
+    publisher.frame(&graph);
+    assert!(Packet::read(&first).unwrap().missing(&Bulk::new()).iter().all(|hash| publisher.bulk(*hash).is_some()));
+}
+
+#[test]
+fn a_node_that_comes_after_its_reference_is_found() {
+    let (mut graph, node) = world();
+    let child = graph.create("All").unwrap();
+    graph.set_local(child, true).unwrap();
+    graph.set_named(node, "children", [child]).unwrap();
+    let mut publisher = Publisher::new();
+    publisher.frame(&graph);
+    let mut bulk = Bulk::new();
+    let mut replica = replica_of(&mut publisher, &graph, &mut bulk);
+    let children = |replica: &Replica| {
+        let graph = replica.graph();
+        let children = graph.get_named::<Arc<[Option<NodeId>]>>(graph.find("mesh").unwrap(), "children").unwrap();
+        children[0].is_some_and(|child| graph.contains(child))
+    };
+    assert!(!children(&replica));
+    graph.set_local(child, false).unwrap();
+    replica.apply(&Packet::read(&publisher.frame(&graph)).unwrap(), &bulk).unwrap();
+    assert!(children(&replica) && replica.agrees());
+    graph.set_local(child, true).unwrap();
+    replica.apply(&Packet::read(&publisher.frame(&graph)).unwrap(), &bulk).unwrap();
+    assert!(!children(&replica) && replica.agrees());
+}
+
+#[test]
+fn the_dead_are_forgotten_once_nothing_refers_to_them() {
+    let (mut graph, node) = world();
+    let mut publisher = Publisher::new();
+    publisher.frame(&graph);
+    let mut bulk = Bulk::new();
+    let mut replica = replica_of(&mut publisher, &graph, &mut bulk);
+    for frame in 0..60 {
+        let made: Vec<NodeId> = (0..200).map(|_| graph.create("Adder").unwrap()).collect();
+        graph.set_named(node, "node_one", made[0]).unwrap();
+        replica.apply(&Packet::read(&publisher.frame(&graph)).unwrap(), &bulk).unwrap();
+        made.iter().for_each(|node| graph.delete(*node).unwrap());
+        replica.apply(&Packet::read(&publisher.frame(&graph)).unwrap(), &bulk).unwrap();
+        assert!(replica.agrees(), "frame {frame}");
+        let late = replica_of(&mut publisher, &graph, &mut bulk);
+        assert!(late.agrees() && late.difference(&replica).is_none(), "frame {frame}");
+    }
+}
+
+#[test]
+fn bad_packets_are_told_and_do_no_harm() {
+    let (mut graph, node) = world();
+    let mut publisher = Publisher::new();
+    publisher.frame(&graph);
+    let mut bulk = Bulk::new();
+    let mut replica = replica_of(&mut publisher, &graph, &mut bulk);
+    graph.set_named(node, "vec3_one", Vec3::ONE).unwrap();
+    let good = publisher.frame(&graph);
+    let error = |bytes: &[u8]| Packet::read(bytes).err();
+    let changed = |place: usize, value: u8| {
+        let mut bytes = good.clone();
+        bytes[place] ^= value;
+        bytes
+    };
+    assert_eq!(error(b"hello"), Some(ReplicaError::NotAPacket));
+    assert_eq!(error(&changed(0, 1)), Some(ReplicaError::NotAPacket));
+    assert_eq!(error(&changed(4, 2)), Some(ReplicaError::WrongVersion { found: 3, ours: 1 }));
+    for place in 6..good.len() {
+        let found = error(&changed(place, 64));
+        assert!(matches!(found, Some(ReplicaError::Damaged { .. })), "byte {place}: {found:?}");
+    }
+    for end in 0..good.len() {
+        assert!(error(&good[..end]).is_some(), "{end} bytes");
+    }
+    // With a checksum that fits, the records are all that protects.
+    for place in 14..good.len() {
+        let mut bytes = changed(place, 255);
+        let checksum = xxhash_rust::xxh3::xxh3_64_with_seed(&bytes[14..], 1);
+        bytes[6..14].copy_from_slice(&checksum.to_le_bytes());
+        if let Ok(packet) = Packet::read(&bytes) {
+            let mut victim = replica_of(&mut publisher, &graph, &mut bulk);
+            let _ = victim.apply(&packet, &bulk);
+            victim.graph().verify_invariants().unwrap();
+        }
+    }
+    let next = publisher.frame(&graph);
+    let gap = replica.apply(&Packet::read(&next).unwrap(), &bulk);
+    assert_eq!(gap, Err(ReplicaError::Gap { last: 1, found: 3 }));
+    replica.apply(&Packet::read(&good).unwrap(), &bulk).unwrap();
+    replica.apply(&Packet::read(&next).unwrap(), &bulk).unwrap();
+    assert!(replica.agrees());
+    let snapshot = publisher.snapshot(&graph).unwrap();
+    let kind = replica.apply(&Packet::read(&snapshot).unwrap(), &bulk);
+    assert_eq!(kind, Err(ReplicaError::OtherKind { expected: "frame" }));
+    assert_eq!(
+        bulk.learn(5, &[0, 1, 2]).unwrap_err().to_string(),
+        "the packet is damaged: a long value is not what its hash 0000000000000005 says"
+    );
+}
+
+#[test]
+fn a_type_that_means_something_else_is_refused() {
+    let mut graph = Graph::new(vec![NodeType::new("Lamp", "").field(Field::new("power", 1.0f32))]);
+    graph.create("Lamp").unwrap();
+    let mut publisher = Publisher::new();
+    publisher.frame(&graph);
+    let bytes = publisher.snapshot(&graph).unwrap();
+    let packet = Packet::read(&bytes).unwrap();
+    let other = vec![NodeType::new("Lamp", "").field(Field::new("power", 1i32))];
+    let error = Replica::new(&packet, other, &Bulk::new()).err().unwrap().to_string();
+    assert_eq!(
+        error,
+        "field `power` of node type `Lamp` is a f32 in the application and a i32 here: both ends must be of one release"
+    );
+    let mut replica = Replica::new(&packet, vec![NodeType::new("Other", "")], &Bulk::new()).unwrap();
+    assert_eq!(replica.unknown_types(), ["Lamp"]);
+    assert!(replica.agrees());
+}
