@@ -6,6 +6,7 @@
 //!
 //! This crate does not know scripts, files of worlds, or how anything is drawn.
 
+pub mod cluster;
 mod error;
 pub mod navigation;
 pub mod rig;

@@ -1,0 +1,147 @@
+//! The application's end of the frame lock.
+
+use std::collections::BTreeMap;
+
+use super::{DisplayId, TimeUs};
+
+/// How long a display that kept the others waiting is not waited for again: doubles each time.
+const FIRST_REST_US: TimeUs = 100_000;
+const LONGEST_REST_US: TimeUs = 400_000;
+/// Frames in a row after which earlier failures are forgotten.
+const GOOD_FRAMES: u32 = 60;
+/// A display that was not heard of for so long is forgotten.
+const FORGOTTEN_US: TimeUs = 10_000_000;
+
+/// What happens to the application.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ApplicationEvent {
+    /// The next frame was evaluated and sent. Only after the release of the last one.
+    Published(u64),
+    /// A display has drawn a frame and waits to show it.
+    Ready(DisplayId, u64),
+    /// A display left, or its connection broke.
+    Gone(DisplayId),
+    /// Time went on; at least every few milliseconds while a frame waits.
+    Tick,
+}
+
+/// What the application is to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ApplicationAction {
+    /// These displays may show the frame; the next one may be evaluated.
+    Release(u64, Vec<DisplayId>),
+    /// Others wait for this display from now on.
+    Admitted(DisplayId),
+    /// Nobody waits for this display any more; it was late for this frame.
+    Dropped(DisplayId, u64),
+}
+
+#[derive(Clone, Debug)]
+struct Member {
+    is_live: bool,
+    /// The last frame that it was ready with.
+    ready: u64,
+    heard_us: TimeUs,
+    /// Not waited for before this time.
+    rests_until_us: TimeUs,
+    rest_us: TimeUs,
+    good_frames: u32,
+}
+
+/// Who is waited for, and since when.
+#[derive(Clone, Debug)]
+pub struct ApplicationLock {
+    timeout_us: TimeUs,
+    frame: u64,
+    released: u64,
+    published_us: TimeUs,
+    members: BTreeMap<DisplayId, Member>,
+}
+
+impl ApplicationLock {
+    /// Nobody there, nothing published.
+    pub fn new(timeout_us: TimeUs) -> Self {
+        Self { timeout_us, frame: 0, released: 0, published_us: 0, members: BTreeMap::new() }
+    }
+
+    /// True while a frame waits for displays.
+    pub fn waits(&self) -> bool {
+        self.released < self.frame
+    }
+
+    /// The last frame that was published.
+    pub fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    /// Displays that are waited for.
+    pub fn live(&self) -> impl Iterator<Item = DisplayId> {
+        self.members.iter().filter(|(_, member)| member.is_live).map(|(id, _)| *id)
+    }
+
+    /// Takes an event at a time; gives what is to be done, in order.
+    pub fn step(&mut self, now_us: TimeUs, event: ApplicationEvent) -> Vec<ApplicationAction> {
+        let mut actions = Vec::new();
+        match event {
+            ApplicationEvent::Published(frame) => {
+                (self.frame, self.published_us) = (frame, now_us);
+                let rested = |member: &Member| !member.is_live && now_us >= member.rests_until_us && member.ready > 0;
+                for (id, member) in self.members.iter_mut().filter(|(_, member)| rested(member)) {
+                    // Who was heard long ago is not worth waiting for.
+                    if now_us < member.heard_us + self.timeout_us {
+                        member.is_live = true;
+                        actions.push(ApplicationAction::Admitted(*id));
+                    }
+                }
+            }
+            ApplicationEvent::Ready(id, frame) => {
+                let member = self.members.entry(id).or_insert(Member {
+                    is_live: false,
+                    ready: 0,
+                    heard_us: now_us,
+                    rests_until_us: 0,
+                    rest_us: FIRST_REST_US,
+                    good_frames: 0,
+                });
+                member.heard_us = now_us;
+                // A frame of the future is one of another run of the application.
+                if frame <= self.frame {
+                    member.ready = member.ready.max(frame);
+                }
+            }
+            ApplicationEvent::Gone(id) => drop(self.members.remove(&id)),
+            ApplicationEvent::Tick => self.members.retain(|_, member| now_us < member.heard_us + FORGOTTEN_US),
+        }
+        self.release(now_us, &mut actions);
+        actions
+    }
+
+    fn release(&mut self, now_us: TimeUs, actions: &mut Vec<ApplicationAction>) {
+        if !self.waits() {
+            return;
+        }
+        let frame = self.frame;
+        let is_late = now_us >= self.published_us + self.timeout_us;
+        if !is_late && self.members.values().any(|member| member.is_live && member.ready < frame) {
+            return;
+        }
+        for (id, member) in self.members.iter_mut().filter(|(_, member)| member.is_live) {
+            if member.ready < frame {
+                member.is_live = false;
+                member.good_frames = 0;
+                member.rests_until_us = now_us + member.rest_us;
+                member.rest_us = LONGEST_REST_US.min(2 * member.rest_us);
+                actions.push(ApplicationAction::Dropped(*id, frame));
+                continue;
+            }
+            member.good_frames += 1;
+            if member.good_frames >= GOOD_FRAMES {
+                member.rest_us = FIRST_REST_US;
+            }
+        }
+        self.released = frame;
+        // Who was not waited for but is in time may show the frame with the others.
+        let in_time = self.members.iter().filter(|(_, member)| member.ready == frame).map(|(id, _)| *id).collect();
+        actions.push(ApplicationAction::Release(frame, in_time));
+    }
+}

@@ -1,0 +1,226 @@
+//! A display's end of the frame lock.
+
+use std::collections::BTreeSet;
+
+use super::TimeUs;
+
+/// A snapshot that did not come within this time is asked for again.
+const FETCH_US: TimeUs = 200_000;
+/// A frame that is missing may be late for so long before a snapshot is fetched instead.
+const PATIENCE_US: TimeUs = 20_000;
+/// Ready is said again after so long without an answer: it may have been lost.
+const REPEAT_US: TimeUs = 40_000;
+/// More frames than this are not kept to catch up with: a snapshot is less work.
+const BACKLOG: usize = 256;
+
+/// What happens to a display.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DisplayEvent {
+    /// A frame's packet came and is kept.
+    Frame {
+        /// The run of the application; later runs have greater numbers.
+        epoch: u64,
+        /// Its number.
+        frame: u64,
+    },
+    /// A snapshot came and is kept.
+    Snapshot {
+        /// The run of the application.
+        epoch: u64,
+        /// The frame as of which it is.
+        frame: u64,
+    },
+    /// The application lets a frame be shown.
+    Release {
+        /// The run of the application.
+        epoch: u64,
+        /// The frame.
+        frame: u64,
+        /// May this display show it?
+        is_mine: bool,
+    },
+    /// The frame that was to be applied is in the replica, and the replica agrees with the application.
+    Applied(u64),
+    /// The frame could not be applied, or the replica does not agree with the application after it.
+    Diverged(u64),
+    /// The frame was drawn.
+    Drawn(u64),
+    /// Time went on; at least every few milliseconds.
+    Tick,
+}
+
+/// What a display is to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DisplayAction {
+    /// Ask the application for a snapshot.
+    Fetch,
+    /// Make the replica anew from the snapshot that was kept, and forget packets up to it.
+    Restore(u64),
+    /// Apply the packet of this frame to the replica; answer with `Applied` or `Diverged` at once.
+    Apply(u64),
+    /// Draw the replica as it is; answer with `Drawn` when it is done.
+    Draw(u64),
+    /// Tell the application that the frame is drawn.
+    Ready(u64),
+    /// Show what was drawn.
+    Show(u64),
+    /// Forget all packets: they are of another run, or too many.
+    Forget,
+}
+
+/// Which frame is where on its way to the screen.
+#[derive(Clone, Debug, Default)]
+pub struct DisplayLock {
+    epoch: u64,
+    /// The frame that the replica is as of; none without a replica.
+    applied: Option<u64>,
+    is_applying: bool,
+    waiting: BTreeSet<u64>,
+    drawing: Option<u64>,
+    drawn: u64,
+    shown: u64,
+    /// When a snapshot was last asked for, while one is needed.
+    fetching_since_us: Option<TimeUs>,
+    missing_since_us: Option<TimeUs>,
+    said_ready_us: TimeUs,
+}
+
+impl DisplayLock {
+    /// Knows of no application yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The run of the application that is followed; zero before the first.
+    pub fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// The last frame that was shown.
+    pub fn shown(&self) -> u64 {
+        self.shown
+    }
+
+    /// True if the replica is as the application says.
+    pub fn follows(&self) -> bool {
+        self.applied.is_some()
+    }
+
+    /// Takes an event at a time; gives what is to be done, in order.
+    pub fn step(&mut self, now_us: TimeUs, event: DisplayEvent) -> Vec<DisplayAction> {
+        let mut actions = Vec::new();
+        match event {
+            DisplayEvent::Frame { epoch, frame } if self.is_current(epoch, &mut actions) => {
+                if self.applied.is_none_or(|applied| frame > applied) {
+                    self.waiting.insert(frame);
+                }
+                if self.waiting.len() > BACKLOG {
+                    self.lose(&mut actions);
+                }
+                self.advance(now_us, &mut actions);
+            }
+            DisplayEvent::Snapshot { epoch, frame } if self.is_current(epoch, &mut actions) => {
+                if self.applied.is_none() {
+                    (self.applied, self.fetching_since_us) = (Some(frame), None);
+                    actions.push(DisplayAction::Restore(frame));
+                    self.waiting = self.waiting.split_off(&(frame + 1));
+                }
+                self.advance(now_us, &mut actions);
+            }
+            DisplayEvent::Release { epoch, frame, is_mine } if self.is_current(epoch, &mut actions) => {
+                if is_mine && self.drawn == frame && self.shown < frame {
+                    self.shown = frame;
+                    actions.push(DisplayAction::Show(frame));
+                }
+                self.advance(now_us, &mut actions);
+            }
+            DisplayEvent::Frame { .. } | DisplayEvent::Snapshot { .. } | DisplayEvent::Release { .. } => {}
+            DisplayEvent::Applied(frame) => {
+                self.is_applying = false;
+                if self.applied.is_some() {
+                    self.applied = Some(frame);
+                }
+                self.advance(now_us, &mut actions);
+            }
+            DisplayEvent::Diverged(_) => {
+                self.is_applying = false;
+                self.applied = None;
+                self.advance(now_us, &mut actions);
+            }
+            DisplayEvent::Drawn(frame) => {
+                // What was drawn for another run of the application is worth nothing.
+                if self.drawing == Some(frame) {
+                    self.drawing = None;
+                    self.drawn = frame;
+                    self.say_ready(now_us, &mut actions);
+                }
+                self.advance(now_us, &mut actions);
+            }
+            DisplayEvent::Tick => {
+                if self.drawn > self.shown && self.drawing.is_none() && now_us >= self.said_ready_us + REPEAT_US {
+                    self.say_ready(now_us, &mut actions);
+                }
+                self.advance(now_us, &mut actions);
+            }
+        }
+        actions
+    }
+
+    /// False for an earlier run of the application; a later one starts everything anew.
+    fn is_current(&mut self, epoch: u64, actions: &mut Vec<DisplayAction>) -> bool {
+        if epoch > self.epoch {
+            // What is being drawn goes on, but for nobody.
+            let is_applying = self.is_applying;
+            *self = Self { epoch, is_applying, ..Self::default() };
+            actions.push(DisplayAction::Forget);
+        }
+        epoch == self.epoch
+    }
+
+    fn lose(&mut self, actions: &mut Vec<DisplayAction>) {
+        self.waiting.clear();
+        self.applied = None;
+        actions.push(DisplayAction::Forget);
+    }
+
+    fn say_ready(&mut self, now_us: TimeUs, actions: &mut Vec<DisplayAction>) {
+        self.said_ready_us = now_us;
+        actions.push(DisplayAction::Ready(self.drawn));
+    }
+
+    /// Does what can be done next.
+    fn advance(&mut self, now_us: TimeUs, actions: &mut Vec<DisplayAction>) {
+        if self.is_applying || self.drawing.is_some() || self.epoch == 0 {
+            return;
+        }
+        let Some(applied) = self.applied else { return self.fetch(now_us, actions) };
+        match self.waiting.first().copied() {
+            Some(frame) if frame == applied + 1 => {
+                self.waiting.remove(&frame);
+                self.missing_since_us = None;
+                self.is_applying = true;
+                return actions.push(DisplayAction::Apply(frame));
+            }
+            Some(_) => {
+                let since = *self.missing_since_us.get_or_insert(now_us);
+                if now_us >= since + PATIENCE_US {
+                    self.missing_since_us = None;
+                    self.applied = None;
+                    return self.fetch(now_us, actions);
+                }
+            }
+            None => self.missing_since_us = None,
+        }
+        if applied > self.drawn {
+            self.drawing = Some(applied);
+            actions.push(DisplayAction::Draw(applied));
+        }
+    }
+
+    fn fetch(&mut self, now_us: TimeUs, actions: &mut Vec<DisplayAction>) {
+        if self.fetching_since_us.is_none_or(|since| now_us >= since + FETCH_US) {
+            self.fetching_since_us = Some(now_us);
+            actions.push(DisplayAction::Fetch);
+        }
+    }
+}

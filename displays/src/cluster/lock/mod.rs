@@ -1,0 +1,28 @@
+//! The frame lock: no display shows a frame before all live displays have drawn it, and nobody waits longer than the timeout for one that is
+//! dead, frozen or cut off.
+//!
+//! Both ends are pure state machines: events and the time go in, actions come out. They know nothing of packets' contents, sockets or
+//! threads, so that a simulation can delay, drop, repeat and reorder every message, and crash either end.
+//!
+//! The application publishes frame n and waits until every live display is ready with it; then it releases n and names those who may
+//! show it. A display is live once it was heard to be ready; it stops being so when it keeps the others waiting for longer than the timeout,
+//! and becomes so again by being ready again. Frames are numbered without gaps within an epoch, which is one run of the application; a
+//! display that misses a frame fetches a snapshot.
+
+mod application;
+mod display;
+#[cfg(test)]
+mod simulation;
+
+pub use application::{ApplicationAction, ApplicationEvent, ApplicationLock};
+pub use display::{DisplayAction, DisplayEvent, DisplayLock};
+
+/// One run of a display process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct DisplayId(pub u64);
+
+/// Microseconds of a clock that only goes forward.
+pub type TimeUs = u64;
+
+/// How long the application waits for a display, unless told otherwise.
+pub const TIMEOUT_US: TimeUs = 200_000;

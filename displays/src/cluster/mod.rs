@@ -1,0 +1,7 @@
+//! One application, many display processes, all on the same frame.
+//!
+//! The application evaluates and publishes one packet per frame ([`umbriel_fields::replica`]); displays apply it to replicas, draw, report
+//! ready, and show on release. The frame lock ([`lock`]) is two state machines without sockets or clocks; the rest of this module moves
+//! their messages, on zenoh, and exists with the cargo feature `cluster`.
+
+pub mod lock;
