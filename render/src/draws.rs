@@ -200,6 +200,11 @@ impl Draws {
         (draws, culled)
     }
 
+    /// Numbers of the drawables of one draw.
+    pub(crate) fn visible_of(&self, draw: &Draw) -> &[u32] {
+        &self.visible[draw.first as usize..][..draw.count as usize]
+    }
+
     /// Draws of what is half-transparent, the farthest first.
     pub(crate) fn back_to_front(&mut self, planes: &Planes, view_from_world: &Mat4) -> (Vec<Draw>, usize) {
         let mut found = Vec::new();

@@ -7,9 +7,9 @@ use crate::lights::Lights;
 use crate::plan::{BLACK_FILM, Purpose};
 use crate::slots::Slots;
 use crate::uniforms;
-use crate::volumes::{VolumeCaster, VolumeJob, VolumeLight};
+use crate::volumes::{Cone, Surface, VolumeCaster, VolumeJob, VolumeLight};
 use glam::{Vec3, Vec4};
-use umbriel_scene::{Light, LightKind, Mesh, Scene, ShadowMethod, StencilMode};
+use umbriel_scene::{Aabb, AlphaMode, Light, LightKind, Mesh, Scene, ShadowMethod, StencilMode};
 
 /// All jobs of the frame and what each is for. Films are added to `films`.
 pub(crate) fn jobs(
@@ -24,6 +24,7 @@ pub(crate) fn jobs(
     debug_assert_eq!(black, BLACK_FILM);
     let caster = |index: usize| caster(scene, draws, meshes, deformer, index);
     let (mut jobs, mut purposes) = (Vec::new(), Vec::new());
+    let receivers = receivers(draws.drawn().map(|(i, _)| i), scene);
     for (place, &index) in lights.order.iter().enumerate().skip(lights.in_surface_pass) {
         let light = &scene.lights[index];
         let casters = if light.shadows == ShadowMethod::Volume {
@@ -35,7 +36,7 @@ pub(crate) fn jobs(
             members.dedup();
             members.into_iter().filter_map(caster).collect()
         };
-        jobs.push(VolumeJob { light: volume_light(light), casters });
+        jobs.push(VolumeJob { light: volume_light(light), casters, receivers });
         purposes.push(Purpose::Light(place));
     }
     for group in &scene.stencil_groups {
@@ -47,7 +48,8 @@ pub(crate) fn jobs(
         let [r, g, b, a] = film.color.to_array();
         let film = films.push(&uniforms::Film { color: [r * a, g * a, b * a, a] });
         let casters = group.casters.iter().filter_map(|i| caster(*i)).collect();
-        jobs.push(VolumeJob { light: volume_light(light), casters });
+        // A film darkens what is outside of the cone too.
+        jobs.push(VolumeJob { light: VolumeLight { cone: None, ..volume_light(light) }, casters, receivers });
         purposes.push(Purpose::Film { film, light: group.light });
     }
     (jobs, purposes)
@@ -59,7 +61,26 @@ fn volume_light(light: &Light) -> VolumeLight {
         _ => light.position.extend(1.0),
     };
     let range = if toward_light.w == 0.0 { f32::INFINITY } else { light.range };
-    VolumeLight { toward_light, range }
+    let cone = match light.kind {
+        LightKind::Spot { outer_rad, .. } => Some(Cone { direction: light.direction.normalize_or(Vec3::NEG_Z), outer_rad }),
+        _ => None,
+    };
+    VolumeLight { toward_light, range, cone, settings: light.volume }
+}
+
+/// Box around those of the drawables that shadows may fall on; empty where one of these has no bounds.
+pub(crate) fn receivers(drawables: impl Iterator<Item = usize>, scene: &Scene) -> Aabb {
+    let mut all = Aabb::EMPTY;
+    for index in drawables {
+        let d = &scene.drawables[index];
+        if d.receives_shadow && d.material.alpha != AlphaMode::Blend {
+            if d.bounds_in_world.is_empty() {
+                return Aabb::EMPTY;
+            }
+            all = all.union(d.bounds_in_world);
+        }
+    }
+    all
 }
 
 fn caster(
@@ -79,5 +100,9 @@ fn caster(
         positions_revision: deformed.map_or(0, |d| d.revision),
         world_from_object: drawable.world_from_object,
         bounds_in_world: drawable.bounds_in_world,
+        surface: match drawable.material.alpha {
+            AlphaMode::Opaque if drawable.material.double_sided => Surface::BothSides,
+            _ => Surface::InParts,
+        },
     })
 }

@@ -6,7 +6,8 @@ use crate::lights::Lights;
 use crate::slots::Slots;
 use crate::stats::{FrameStats, Problems};
 use crate::surface::Pass;
-use crate::uniforms;
+use crate::volumes::Sight;
+use crate::{jobs, uniforms};
 use glam::{Mat4, Vec3};
 use umbriel_scene::{Layout, Picture, PictureKind, Rect, Scene, View};
 
@@ -26,6 +27,8 @@ pub(crate) struct ViewPlan {
     pub(crate) blended: Vec<Draw>,
     /// Those of the opaque shapes that receive no shadows.
     pub(crate) exempt: Vec<Draw>,
+    /// What shadow volumes are chosen by.
+    pub(crate) sight: Sight,
     /// Shadow volumes and what is done with each.
     pub(crate) steps: Vec<Step>,
 }
@@ -159,6 +162,8 @@ pub(crate) fn plan_picture(
             };
             steps.push(Step { job, then });
         }
+        let seen = opaque.iter().flat_map(|d| draws.visible_of(d)).map(|i| *i as usize);
+        let sight = Sight::new(view, jobs::receivers(seen, frame.scene));
         let in_base = match shown {
             Some(place) => usize::from(place < frame.lights.in_surface_pass),
             None if is_visibility => 0,
@@ -176,6 +181,7 @@ pub(crate) fn plan_picture(
             opaque,
             blended,
             exempt,
+            sight,
             steps,
         });
     }

@@ -109,7 +109,8 @@ impl Recorder<'_> {
             }
             drop(pass);
             pass = begin_view(encoder, self.clock, "shadow volumes", to, false, number + 1 == view.steps.len());
-            self.volumes.draw(&mut pass, step.job, self.views.group(view.base_slot));
+            let drawn = self.volumes.draw(&mut pass, step.job, self.views.group(view.base_slot), &view.sight);
+            self.stats.volumes.add(&drawn);
             pass.set_stencil_reference(0);
             pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
             self.surfaces(&mut pass, &view.exempt, Pass::Exempt);

@@ -205,7 +205,7 @@ impl Renderer {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         stats.deformed = self.deformer.run(&mut encoder, &self.clock);
-        self.volumes.prepare(device, &mut encoder, jobs);
+        stats.volumes_made = self.volumes.prepare(device, &mut encoder, jobs);
         let drawer = Drawer {
             meshes: &self.meshes,
             materials: &self.materials,

@@ -1,5 +1,6 @@
 //! What a frame cost, and what was wrong with it.
 
+use crate::volumes::{VolumeDraws, VolumeStats};
 use std::collections::HashSet;
 
 /// Numbers of one frame.
@@ -23,6 +24,10 @@ pub struct FrameStats {
     pub deformed: u32,
     /// Jobs of the shadow volumes: lights and groups.
     pub volume_jobs: u32,
+    /// How the frame's volumes were made.
+    pub volumes_made: VolumeStats,
+    /// How they were drawn, summed over views.
+    pub volumes: VolumeDraws,
     /// CPU time until everything is sent to the GPU, seconds.
     pub prepare_s: f64,
     /// CPU time of recording and submitting, seconds.

@@ -11,7 +11,8 @@ mod truth;
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 use harness::{Gpu, Loaded, light};
 use shapes::{Thing, cuboid, exploded, inconsistent, merged, sheet, soup, sphere, three_blades};
-use umbriel_scene::{Frustum, View};
+use umbriel_render::volumes::{VolumeDraws, VolumeLight};
+use umbriel_scene::{Frustum, Silhouettes, View, VolumeCounting, VolumeSettings};
 
 const SIZE: [u32; 2] = [128, 96];
 /// Share of counted samples that may differ from the truth.
@@ -27,12 +28,16 @@ struct Score {
 
 /// Draws one picture at each sample count and compares every sample.
 fn compare(gpus: &mut [(u32, Gpu)], casters: &[Thing], receivers: &[Thing], toward_light: Vec4, view: &View) -> Score {
-    let truth = truth::Truth::new(casters, receivers, light(toward_light).toward_light, view);
+    compare_under(gpus, casters, receivers, light(toward_light), view)
+}
+
+fn compare_under(gpus: &mut [(u32, Gpu)], casters: &[Thing], receivers: &[Thing], light: VolumeLight, view: &View) -> Score {
+    let truth = truth::Truth::new(casters, receivers, light.toward_light, view);
     let mut score = Score::default();
     for (samples, gpu) in gpus {
         let load = |things: &[Thing]| -> Vec<Loaded> { things.iter().map(|t| gpu.load(t)).collect() };
         let (casters, receivers) = (load(casters), load(receivers));
-        let (stencil, _) = gpu.stencil(&casters, &receivers, light(toward_light), view);
+        let (stencil, ..) = gpu.stencil(&casters, &receivers, light, view);
         let places = harness::sample_places(*samples);
         let (mut counted, mut wrong) = (0, 0);
         for (i, value) in stencil.into_iter().enumerate() {
@@ -264,8 +269,14 @@ fn three_hundred_layers() {
     let view = looking(Vec3::new(0.7, 0.8, 2.4), Vec3::new(0.7, 0.0, 0.5), Frustum::symmetric(0.7, 128.0 / 96.0, 0.05));
     let mut gpus = both();
     for toward_light in [Vec4::new(0.02, 1.0, 0.01, 0.0), Vec4::new(0.7, 20.0, 0.0, 1.0)] {
-        for (name, casters) in [("300 casters", plates.clone()), ("one mesh of 300 pieces", vec![merged(&plates)])] {
-            let score = compare(&mut gpus, &casters, &[sheet(6.0)], toward_light, &view);
+        for (name, casters, silhouettes) in [
+            ("300 casters", plates.clone(), Silhouettes::Compute),
+            ("one mesh of 300 pieces", vec![merged(&plates)], Silhouettes::Compute),
+            ("one mesh of 300 pieces as quads", vec![merged(&plates)], Silhouettes::Quads),
+        ] {
+            let settings = VolumeSettings { silhouettes, ..VolumeSettings::default() };
+            let under = VolumeLight { settings, ..light(toward_light) };
+            let score = compare_under(&mut gpus, &casters, &[sheet(6.0)], under, &view);
             println!("{name}: {} of {} wrong, {} shadowed", score.wrong, score.counted, score.shadowed);
             assert!(score.wrong as f64 <= ALLOWED * score.counted as f64, "{name}: {} of {} wrong", score.wrong, score.counted);
             assert!(score.shadowed > 5000, "{name}");
@@ -290,7 +301,7 @@ fn lists_are_kept_and_renewed() {
             gpu.queue.write_buffer(&a.positions, 0, bytemuck::cast_slice(&away));
         }
         let casters: Vec<Loaded> = casters.iter().map(|l| (*l).clone()).collect();
-        let (stencil, stats) = gpu.stencil(&casters, std::slice::from_ref(&floor), light(toward_light), &view);
+        let (stencil, stats, _) = gpu.stencil(&casters, std::slice::from_ref(&floor), light(toward_light), &view);
         (stencil.iter().filter(|s| **s != 0).count(), [stats.extracted, stats.kept, stats.left_out])
     };
     let (first, _) = shadowed(&[&a, &b], sun(), false);
@@ -318,12 +329,23 @@ fn lists_are_kept_and_renewed() {
 
 #[test]
 fn shaders_are_valid() {
-    let read = |file: &str| match file {
-        "extract" => [harness::POSITION, include_str!("../src/volumes/extract.wgsl")].concat(),
-        _ => [harness::VIEW, harness::POSITION, include_str!("../src/volumes/draw.wgsl")].concat(),
-    };
-    for file in ["extract", "draw"] {
-        let module = naga::front::wgsl::parse_str(&read(file)).unwrap_or_else(|e| panic!("{file}: {}", e.emit_to_string("")));
+    let silhouette = include_str!("../src/volumes/silhouette.wgsl");
+    let files = [
+        (
+            "extract",
+            [
+                harness::POSITION,
+                silhouette,
+                include_str!("../src/volumes/caster.wgsl"),
+                include_str!("../src/volumes/extract.wgsl"),
+            ]
+            .concat(),
+        ),
+        ("draw", [harness::VIEW, harness::POSITION, silhouette, include_str!("../src/volumes/draw.wgsl")].concat()),
+        ("quads", [harness::VIEW, harness::POSITION, silhouette, include_str!("../src/volumes/quads.wgsl")].concat()),
+    ];
+    for (file, source) in files {
+        let module = naga::front::wgsl::parse_str(&source).unwrap_or_else(|e| panic!("{file}: {}", e.emit_to_string(&source)));
         let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
         validator.validate(&module).unwrap_or_else(|e| panic!("{file}: {e:?}"));
         let (_, caster) =
@@ -332,4 +354,55 @@ fn shaders_are_valid() {
         let offsets: Vec<u32> = members.iter().map(|m| m.offset).collect();
         assert_eq!((offsets, *span), (vec![0, 64, 80, 84, 88, 92], 96), "{file}");
     }
+}
+
+/// Counting in front of what is seen, ends, scissors and culling change nothing in the picture, nor does another way to
+/// find silhouettes: stencils are equal sample by sample.
+#[test]
+fn all_settings_give_the_same_stencil() {
+    let all_off = VolumeSettings { counting: VolumeCounting::ZFail, culling: false, fitted: false, ..VolumeSettings::default() };
+    let variants = [
+        ("auto", VolumeSettings { counting: VolumeCounting::Auto, ..all_off }),
+        ("culled", VolumeSettings { culling: true, ..all_off }),
+        ("fitted", VolumeSettings { fitted: true, ..all_off }),
+        ("all", VolumeSettings::default()),
+        ("quads", VolumeSettings { silhouettes: Silhouettes::Quads, ..all_off }),
+        ("all with quads", VolumeSettings { silhouettes: Silhouettes::Quads, ..VolumeSettings::default() }),
+    ];
+    let tilt = Mat4::from_rotation_translation(Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.5, 0.2), Vec3::new(-0.4, 0.8, 0.9));
+    let casters = [
+        cuboid(Vec3::new(0.9, 0.3, 0.8)).at(Vec3::Y * 2.0),
+        cuboid(Vec3::new(0.5, 0.4, 0.5)).edited(|_, i| i.truncate(30)).at(Vec3::new(0.7, 0.6, -0.5)),
+        inconsistent(sphere(0.3, 12, 6)).under(tilt),
+        sphere(0.4, 16, 8).under(Mat4::from_translation(Vec3::new(1.5, 0.7, 1.2)) * Mat4::from_scale(Vec3::new(1.0, -1.0, 1.0))),
+        sheet(0.7).at(Vec3::new(-0.9, 1.3, 0.3)),
+        three_blades().at(Vec3::new(0.2, 1.0, -1.6)),
+    ];
+    let mut random = Random(11);
+    let mut totals = [VolumeDraws::default(); 6];
+    for (samples, views) in [(1, 40), (4, 20)] {
+        let mut gpu = Gpu::new(samples);
+        let casters: Vec<Loaded> = casters.iter().map(|t| gpu.load(t)).collect();
+        let receivers: Vec<Loaded> = room().iter().map(|t| gpu.load(t)).collect();
+        for i in 0..views {
+            let toward_light = [sun(), lamp(), Vec4::new(0.1, 3.0, 0.2, 1.0), Vec4::new(0.7, 0.6, -0.5, 1.0)][i % 4];
+            let eye = random.around(Vec3::new(-0.2, 1.2, -0.2), Vec3::new(2.8, 1.15, 2.8));
+            let at = random.around(Vec3::new(0.0, 0.6, 0.0), Vec3::splat(1.5));
+            let view = looking(eye, at, random.off_axis([0.02, 0.1, 0.4][i / 4 % 3]));
+            let mut drawn = |settings| gpu.stencil(&casters, &receivers, VolumeLight { settings, ..light(toward_light) }, &view);
+            let (expected, _, plain) = drawn(all_off);
+            assert_eq!((plain.z_fail, plain.culled), (6, 0), "view {i}");
+            for (v, (name, settings)) in variants.into_iter().enumerate() {
+                let (found, _, draws) = drawn(settings);
+                let differ = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
+                assert_eq!(differ, 0, "{name}, view {i} from {eye} to {at}, {samples} samples, light {toward_light}: {draws:?}");
+                totals[v].add(&draws);
+            }
+        }
+    }
+    println!("{totals:?}");
+    let [auto, culled, .., all, _, _] = totals;
+    // Each of them had something to do.
+    assert!(auto.z_pass > 40 && auto.z_fail > 40, "{auto:?}");
+    assert!(culled.culled > 20 && all.culled > 20 && all.far_caps < culled.far_caps + all.z_fail, "{culled:?} {all:?}");
 }

@@ -11,9 +11,15 @@ pub(super) struct GpuPart {
     pub(super) triangle_count: u32,
     pub(super) edge_count: u32,
     pub(super) layers: u32,
+    /// Are there surfaces that cast as they are wound, and such that cast turned over, before a matrix mirrors them?
+    pub(super) windings: [bool; 2],
+    /// Most triangles at one edge.
+    pub(super) widest_edge: u32,
     pub(super) triangles: wgpu::Buffer,
     pub(super) edges: wgpu::Buffer,
     pub(super) incidences: wgpu::Buffer,
+    /// Edge of each incidence.
+    pub(super) edge_of: wgpu::Buffer,
 }
 
 /// Parts of all meshes that were ever asked for and still live.
@@ -57,7 +63,12 @@ impl GpuPart {
                 usage: wgpu::BufferUsages::STORAGE,
             })
         };
+        let has = |winding: u32| part.triangles.iter().any(|t| t[3] == 0 || t[3] == winding);
+        let edge_of: Vec<u32> = (0u32..).zip(&part.edges).flat_map(|(i, e)| std::iter::repeat_n(i, e[3] as usize)).collect();
         GpuPart {
+            windings: [has(1), has(2)],
+            widest_edge: part.edges.iter().map(|e| e[3]).max().unwrap_or(0),
+            edge_of: buffer("volume edges of incidences", bytemuck::cast_slice(&edge_of)),
             triangle_count: part.triangles.len() as u32,
             edge_count: part.edges.len() as u32,
             layers: part.layers,

@@ -1,12 +1,24 @@
-//! Counts volumes into the stencil: both faces in one draw, where they lie behind what is seen.
+//! Counts volumes into the stencil: both faces in one draw, in front of or behind what is seen.
 
-use super::extract::{CAPS, Lists, SIDES, TURNED_CAPS};
+use super::choose::Choice;
+use super::extract::{Lists, Piece};
 use super::parts::{GROUP_LAYERS, STENCIL_LAYERS};
+use std::collections::HashMap;
 use wgpu::{CompareFunction, StencilOperation};
 
-/// WGSL of this pass: the View of bind group 0, the shared ways from vertices to the screen, then its own.
-pub(super) const SHADER: &str =
-    concat!(include_str!("../shaders/view.wgsl"), include_str!("../shaders/position.wgsl"), include_str!("draw.wgsl"));
+/// WGSL of the pass: the View of bind group 0, the shared ways from vertices to the screen, then its own.
+pub(super) const LISTED: &str = concat!(
+    include_str!("../shaders/view.wgsl"),
+    include_str!("../shaders/position.wgsl"),
+    include_str!("silhouette.wgsl"),
+    include_str!("draw.wgsl")
+);
+pub(super) const QUADS: &str = concat!(
+    include_str!("../shaders/view.wgsl"),
+    include_str!("../shaders/position.wgsl"),
+    include_str!("silhouette.wgsl"),
+    include_str!("quads.wgsl")
+);
 
 /// Bits of the stencil that count where groups follow each other; the eighth remembers.
 const COUNT_BITS: u32 = 0x7f;
@@ -20,143 +32,235 @@ pub(super) struct Target {
     pub(super) colour_format: Option<wgpu::TextureFormat>,
 }
 
-/// Counting with one mask of stencil bits.
-struct Counting {
-    volume: wgpu::RenderPipeline,
-    turned: wgpu::RenderPipeline,
+/// Layouts of bind group 1.
+#[derive(Clone)]
+pub(super) struct Layouts {
+    /// The caster and its positions.
+    pub(super) listed: wgpu::BindGroupLayout,
+    /// The same, with its triangles and edges.
+    pub(super) quads: wgpu::BindGroupLayout,
+}
+
+impl Layouts {
+    pub(super) fn new(device: &wgpu::Device) -> Layouts {
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::VERTEX,
+            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+            count: None,
+        };
+        let layout = |label, buffers| {
+            let mut entries = vec![entry(0, wgpu::BufferBindingType::Uniform)];
+            entries.extend((1..=buffers).map(|i| entry(i, wgpu::BufferBindingType::Storage { read_only: true })));
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+        };
+        Layouts { listed: layout("volume caster", 1), quads: layout("volume caster for quads", 5) }
+    }
+}
+
+/// What a pipeline is chosen by, in the order in which they are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+struct Kind {
+    /// Seven bits count, with the step between groups.
+    grouped: bool,
+    /// None for lists, else the piece that the vertex shader makes.
+    quads: Option<Piece>,
+    z_fail: bool,
+    turned: bool,
 }
 
 /// Pipelines of the draw.
 pub(super) struct Drawing {
-    /// All eight bits, for jobs that fit.
-    whole: Counting,
-    /// Seven bits, with `remember` between groups.
-    grouped: Counting,
+    target: Target,
+    listed: (wgpu::ShaderModule, wgpu::PipelineLayout),
+    quads: (wgpu::ShaderModule, wgpu::PipelineLayout),
+    counting: HashMap<Kind, wgpu::RenderPipeline>,
+    /// Drops the counts of a group and remembers where they were not 0.
     remember: wgpu::RenderPipeline,
 }
 
-/// Layout of bind group 1: the caster and its positions.
-pub(super) fn placed_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::VERTEX,
-        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
-        count: None,
-    };
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("volume caster"),
-        entries: &[entry(0, wgpu::BufferBindingType::Uniform), entry(1, wgpu::BufferBindingType::Storage { read_only: true })],
-    })
-}
-
 /// Reversed depth: what is behind or level with the visible surface fails, near caps on their own surface among it.
-/// Faces turned to the eye end a shadow that began behind them, so they count down (the mirror of 000's front state).
-fn z_fail(write_mask: u32, turned: bool) -> (CompareFunction, wgpu::StencilState) {
-    let face = |depth_fail_op| wgpu::StencilFaceState { compare: CompareFunction::Always, depth_fail_op, ..Default::default() };
+///
+/// Counting behind what is seen, faces turned to the eye end a shadow that began behind them, so they count down (the
+/// mirror of 000's front state). Counting in front of it they begin one, so they count up.
+fn counting(write_mask: u32, z_fail: bool, turned: bool) -> wgpu::StencilState {
+    let face = |op| {
+        let keep = wgpu::StencilFaceState { compare: CompareFunction::Always, ..Default::default() };
+        if z_fail { wgpu::StencilFaceState { depth_fail_op: op, ..keep } } else { wgpu::StencilFaceState { pass_op: op, ..keep } }
+    };
     let (down, up) = (face(StencilOperation::DecrementWrap), face(StencilOperation::IncrementWrap));
-    let (front, back) = if turned { (up, down) } else { (down, up) };
-    (CompareFunction::Greater, wgpu::StencilState { front, back, read_mask: 0xff, write_mask })
+    let (front, back) = if turned == z_fail { (up, down) } else { (down, up) };
+    wgpu::StencilState { front, back, read_mask: 0xff, write_mask }
 }
 
 /// Where any bit counts, the count is dropped and the eighth bit set.
-fn remembering() -> (CompareFunction, wgpu::StencilState) {
+fn remembering() -> wgpu::StencilState {
     let face =
         wgpu::StencilFaceState { compare: CompareFunction::NotEqual, pass_op: StencilOperation::Replace, ..Default::default() };
-    (CompareFunction::Always, wgpu::StencilState { front: face, back: face, read_mask: COUNT_BITS, write_mask: 0xff })
+    wgpu::StencilState { front: face, back: face, read_mask: COUNT_BITS, write_mask: 0xff }
 }
 
 impl Drawing {
-    pub(super) fn new(
-        device: &wgpu::Device,
-        target: Target,
-        view_layout: &wgpu::BindGroupLayout,
-        placed_layout: &wgpu::BindGroupLayout,
-    ) -> Drawing {
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("volume draw"),
-            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
-        });
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("volume draw"),
-            bind_group_layouts: &[Some(view_layout), Some(placed_layout)],
-            immediate_size: 0,
-        });
-        let targets = [target.colour_format.map(|format| wgpu::ColorTargetState {
-            format,
-            blend: None,
-            write_mask: wgpu::ColorWrites::empty(),
-        })];
-        let pipeline = |label, entry_point, (depth_compare, stencil)| {
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+    pub(super) fn new(device: &wgpu::Device, target: Target, view_layout: &wgpu::BindGroupLayout, layouts: &Layouts) -> Drawing {
+        let program = |label, source: &'static str, layouts: &[Option<&wgpu::BindGroupLayout>]| {
+            let source = wgpu::ShaderSource::Wgsl(source.into());
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source });
+            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(label),
-                layout: Some(&layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some(entry_point),
-                    compilation_options: Default::default(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: target.depth_stencil_format,
-                    depth_write_enabled: Some(false),
-                    depth_compare: Some(depth_compare),
-                    stencil,
-                    bias: Default::default(),
-                }),
-                multisample: wgpu::MultisampleState { count: target.sample_count, ..Default::default() },
-                fragment: target.colour_format.map(|_| wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some("no_colour"),
-                    compilation_options: Default::default(),
-                    targets: &targets,
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
+                bind_group_layouts: layouts,
+                immediate_size: 0,
+            });
+            (module, layout)
         };
-        let counting = |mask| Counting {
-            volume: pipeline("volume", "place", z_fail(mask, false)),
-            turned: pipeline("volume, turned caps", "place", z_fail(mask, true)),
-        };
-        Drawing {
-            whole: counting(0xff),
-            grouped: counting(COUNT_BITS),
-            remember: pipeline("volume group end", "whole_view", remembering()),
-        }
+        let listed = program("volume draw", LISTED, &[Some(view_layout), Some(&layouts.listed)]);
+        let quads = program("volume quads", QUADS, &[Some(view_layout), Some(&layouts.quads)]);
+        let alone = program("volume group end", LISTED, &[]);
+        let remember = pipeline(device, &target, &alone, "whole_view", CompareFunction::Always, remembering());
+        Drawing { target, listed, quads, counting: HashMap::new(), remember }
     }
 
-    /// Draws all lists of a job, in groups that cannot overflow the stencil.
-    pub(super) fn run(&self, pass: &mut wgpu::RenderPass<'_>, lists: &[Lists], view: &wgpu::BindGroup) {
-        pass.set_bind_group(0, view, &[]);
-        let total: u32 = lists.iter().map(|l| l.part.layers.min(STENCIL_LAYERS)).sum();
-        if total <= STENCIL_LAYERS {
-            return self.whole.run(pass, lists);
-        }
-        pass.set_stencil_reference(SHADOWED);
-        for (i, group) in groups(lists, |l| l.part.layers).enumerate() {
-            if i > 0 {
-                pass.set_pipeline(&self.remember);
-                pass.draw(0..3, 0..1);
-            }
-            self.grouped.run(pass, group);
-        }
-    }
-}
-
-impl Counting {
-    fn run(&self, pass: &mut wgpu::RenderPass<'_>, lists: &[Lists]) {
-        for (pipeline, draws) in [(&self.volume, &[SIDES, CAPS][..]), (&self.turned, &[TURNED_CAPS])] {
-            pass.set_pipeline(pipeline);
-            for l in lists {
-                pass.set_bind_group(1, &l.placed, &[]);
-                pass.set_index_buffer(l.indices.slice(..), wgpu::IndexFormat::Uint32);
-                for &draw in draws {
-                    pass.draw_indexed_indirect(&l.draws, draw);
+    /// Makes the pipelines that `lists` may need.
+    pub(super) fn make(&mut self, device: &wgpu::Device, lists: &Lists) {
+        for grouped in [false, true] {
+            for z_fail in [false, true] {
+                for piece in Piece::ALL {
+                    let kind = Kind::of(lists, piece, z_fail, grouped);
+                    if self.counting.contains_key(&kind) {
+                        continue;
+                    }
+                    let mask = if grouped { COUNT_BITS } else { 0xff };
+                    let stencil = counting(mask, z_fail, kind.turned);
+                    let (program, entry) = match kind.quads {
+                        None => (&self.listed, "place"),
+                        Some(Piece::Sides) => (&self.quads, "side"),
+                        Some(Piece::NearCaps) => (&self.quads, "near_cap"),
+                        Some(Piece::TurnedCaps) => (&self.quads, "turned_cap"),
+                        Some(Piece::FarCaps) => (&self.quads, "far_cap"),
+                    };
+                    let made = pipeline(device, &self.target, program, entry, CompareFunction::Greater, stencil);
+                    self.counting.insert(kind, made);
                 }
             }
         }
     }
+
+    /// Draws the lists of a job that a view shows, in groups that cannot overflow the stencil.
+    pub(super) fn run(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        shown: &[(&Lists, Choice)],
+        whole: [u32; 4],
+        view: &wgpu::BindGroup,
+    ) {
+        pass.set_bind_group(0, view, &[]);
+        let total: u32 = shown.iter().map(|(l, _)| l.part.layers.min(STENCIL_LAYERS)).sum();
+        let mut scissor = whole;
+        if total <= STENCIL_LAYERS {
+            self.count(pass, shown, false, &mut scissor);
+        } else {
+            pass.set_stencil_reference(SHADOWED);
+            for (i, group) in groups(shown, |(l, _)| l.part.layers).enumerate() {
+                if i > 0 {
+                    cut(pass, &mut scissor, whole);
+                    pass.set_pipeline(&self.remember);
+                    pass.draw(0..3, 0..1);
+                }
+                self.count(pass, group, true, &mut scissor);
+            }
+        }
+        cut(pass, &mut scissor, whole);
+    }
+
+    /// Draws all pieces, sorted so that pipelines follow each other.
+    fn count(&self, pass: &mut wgpu::RenderPass<'_>, shown: &[(&Lists, Choice)], grouped: bool, scissor: &mut [u32; 4]) {
+        let mut pieces = Vec::with_capacity(2 * shown.len());
+        for (place, (lists, choice)) in shown.iter().enumerate() {
+            let wanted = |piece| match piece {
+                Piece::Sides => true,
+                Piece::NearCaps | Piece::TurnedCaps => choice.near_caps && lists.has(piece),
+                Piece::FarCaps => choice.far_caps,
+            };
+            let kinds = Piece::ALL.into_iter().filter(|p| wanted(*p));
+            pieces.extend(kinds.map(|piece| (Kind::of(lists, piece, choice.z_fail, grouped), place, piece)));
+        }
+        pieces.sort_unstable();
+        let (mut kind, mut bound) = (None, None);
+        for (wanted, place, piece) in pieces {
+            let (lists, choice) = &shown[place];
+            let Some(pipeline) = self.counting.get(&wanted) else { continue };
+            if kind.replace(wanted) != Some(wanted) {
+                pass.set_pipeline(pipeline);
+            }
+            if bound.replace(place) != Some(place) {
+                pass.set_bind_group(1, &lists.placed, &[]);
+                cut(pass, scissor, choice.scissor);
+                if let Some(listed) = &lists.listed {
+                    pass.set_index_buffer(listed.indices.slice(..), wgpu::IndexFormat::Uint32);
+                }
+            }
+            match (&lists.listed, piece) {
+                (Some(listed), _) => pass.draw_indexed_indirect(&listed.draws, piece.offset()),
+                (None, Piece::Sides) => pass.draw(0..18 * lists.part.triangle_count, 0..1),
+                (None, _) => pass.draw(0..3 * lists.part.triangle_count, 0..1),
+            }
+        }
+    }
+}
+
+impl Kind {
+    fn of(lists: &Lists, piece: Piece, z_fail: bool, grouped: bool) -> Kind {
+        let quads = lists.listed.is_none().then_some(piece);
+        Kind { grouped, quads, z_fail, turned: piece == Piece::TurnedCaps }
+    }
+}
+
+fn cut(pass: &mut wgpu::RenderPass<'_>, now: &mut [u32; 4], to: [u32; 4]) {
+    if *now != to {
+        *now = to;
+        pass.set_scissor_rect(to[0], to[1], to[2], to[3]);
+    }
+}
+
+fn pipeline(
+    device: &wgpu::Device,
+    target: &Target,
+    (module, layout): &(wgpu::ShaderModule, wgpu::PipelineLayout),
+    entry_point: &'static str,
+    depth_compare: CompareFunction,
+    stencil: wgpu::StencilState,
+) -> wgpu::RenderPipeline {
+    let targets = [target.colour_format.map(|format| wgpu::ColorTargetState {
+        format,
+        blend: None,
+        write_mask: wgpu::ColorWrites::empty(),
+    })];
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(entry_point),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some(entry_point),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: target.depth_stencil_format,
+            depth_write_enabled: Some(false),
+            depth_compare: Some(depth_compare),
+            stencil,
+            bias: Default::default(),
+        }),
+        multisample: wgpu::MultisampleState { count: target.sample_count, ..Default::default() },
+        fragment: target.colour_format.map(|_| wgpu::FragmentState {
+            module,
+            entry_point: Some("no_colour"),
+            compilation_options: Default::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
 }
 
 /// Runs of items whose layers fit into one group; an item that is too large stands alone.

@@ -1,19 +1,29 @@
-//! Compute passes that turn triangles to the light and raise sides over the edges that do not cancel.
+//! Buffers of one caster under one light, and the compute passes that turn its triangles to the light and raise sides over
+//! the edges that do not cancel.
 
 use super::VolumeLight;
 use super::cache::GpuPart;
+use super::draw::Layouts;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec4};
 use std::sync::Arc;
-use umbriel_scene::Aabb;
+use umbriel_scene::{Aabb, Silhouettes};
 use wgpu::util::DeviceExt;
 
 /// WGSL of this pass: the shared ways from vertices to the screen, what casts, then its own.
-pub(super) const SHADER: &str =
-    concat!(include_str!("../shaders/position.wgsl"), include_str!("caster.wgsl"), include_str!("extract.wgsl"));
+pub(super) const SHADER: &str = concat!(
+    include_str!("../shaders/position.wgsl"),
+    include_str!("silhouette.wgsl"),
+    include_str!("caster.wgsl"),
+    include_str!("extract.wgsl")
+);
 
 const EVERY_TRIANGLE: u32 = 1;
 const MIRRORED: u32 = 2;
+
+/// Edges of more triangles than this are left to the compute pass: with degenerate quads, every corner of as many quads
+/// would ask all of them.
+const WIDEST_EDGE: u32 = 32;
 
 /// `Caster` of the shaders.
 #[repr(C)]
@@ -24,10 +34,11 @@ pub(super) struct CasterUniform {
     triangle_count: u32,
     edge_count: u32,
     flags: u32,
-    unused: u32,
+    reach_w: f32,
 }
 
 impl CasterUniform {
+    /// Thrown to infinity.
     fn new(light: &VolumeLight, world_from_object: Mat4, bounds: &Aabb, part: &GpuPart) -> CasterUniform {
         // Of a closed surface the near side is enough only while the light is outside of it.
         let (p, margin) = (light.toward_light.truncate(), 1e-3 * bounds.radius());
@@ -45,7 +56,7 @@ impl CasterUniform {
             triangle_count: part.triangle_count,
             edge_count: part.edge_count,
             flags,
-            unused: 0,
+            reach_w: 0.0,
         }
     }
 }
@@ -61,11 +72,27 @@ struct Draw {
     first_instance: u32,
 }
 
-/// Place of each draw's arguments in [`Lists::draws`], bytes.
-pub(super) const SIDES: u64 = 0;
-pub(super) const CAPS: u64 = DRAW_SIZE;
-pub(super) const TURNED_CAPS: u64 = 2 * DRAW_SIZE;
+/// A piece of the volume, in the order of `Draws` of the shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Piece {
+    Sides,
+    NearCaps,
+    /// Near caps whose order of vertices is turned over.
+    TurnedCaps,
+    FarCaps,
+}
+
+impl Piece {
+    pub(super) const ALL: [Piece; 4] = [Piece::Sides, Piece::NearCaps, Piece::TurnedCaps, Piece::FarCaps];
+
+    /// Place of the draw's arguments in [`Listed::draws`], bytes.
+    pub(super) fn offset(self) -> u64 {
+        self as u64 * DRAW_SIZE
+    }
+}
+
 const DRAW_SIZE: u64 = size_of::<Draw>() as u64;
+const DRAWS_SIZE: u64 = 4 * DRAW_SIZE;
 
 /// Everything that decides what the lists hold.
 #[derive(Clone, PartialEq)]
@@ -78,16 +105,50 @@ struct Key {
 /// The volume of one part of a caster under one light.
 pub(super) struct Lists {
     pub(super) part: Arc<GpuPart>,
-    /// Of index, twice the vertex number, plus 1 for the vertex at infinity.
-    pub(super) indices: wgpu::Buffer,
-    pub(super) draws: wgpu::Buffer,
+    /// Place of the caster in its job.
+    pub(super) caster: usize,
     /// Bind group 1 of the draw.
     pub(super) placed: wgpu::BindGroup,
-    bind_group: wgpu::BindGroup,
+    /// None where degenerate quads find the silhouette.
+    pub(super) listed: Option<Listed>,
     uniform: wgpu::Buffer,
-    casts: wgpu::Buffer,
-    local_light: bool,
+    content: CasterUniform,
     key: Key,
+}
+
+/// What the compute pass writes.
+pub(super) struct Listed {
+    /// Twice the vertex number, plus 1 for the vertex thrown away.
+    pub(super) indices: wgpu::Buffer,
+    pub(super) draws: wgpu::Buffer,
+    bind_group: wgpu::BindGroup,
+    casts: wgpu::Buffer,
+}
+
+/// What has to be done before a volume can be drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stale {
+    /// Nothing.
+    No,
+    /// Its uniform is another one.
+    Uniform,
+    /// Its lists hold something else.
+    Lists,
+}
+
+impl Lists {
+    /// Whether near caps in the order of their vertices, and turned ones, can be among them: of closed surfaces only one
+    /// side casts.
+    pub(super) fn has(&self, piece: Piece) -> bool {
+        let is_turned = match piece {
+            Piece::NearCaps => false,
+            Piece::TurnedCaps => true,
+            Piece::Sides | Piece::FarCaps => return true,
+        };
+        let flags = self.content.flags;
+        let is_mirrored = flags & MIRRORED != 0;
+        flags & EVERY_TRIANGLE != 0 || self.part.windings[usize::from(is_turned != is_mirrored)]
+    }
 }
 
 /// What one list is made of.
@@ -95,22 +156,24 @@ pub(super) struct Lists {
 pub(super) struct Wanted<'a> {
     pub(super) light: &'a VolumeLight,
     pub(super) part: &'a Arc<GpuPart>,
+    pub(super) caster: usize,
     pub(super) positions: &'a wgpu::Buffer,
     pub(super) positions_revision: u64,
     pub(super) world_from_object: Mat4,
     pub(super) bounds_in_world: &'a Aabb,
+    pub(super) reach_w: f32,
 }
 
 /// Pipelines of the two steps.
 pub(super) struct Extract {
     layout: wgpu::BindGroupLayout,
-    placed_layout: wgpu::BindGroupLayout,
+    placing: Layouts,
     turn_triangles: wgpu::ComputePipeline,
     raise_edges: wgpu::ComputePipeline,
 }
 
 impl Extract {
-    pub(super) fn new(device: &wgpu::Device, placed_layout: &wgpu::BindGroupLayout) -> Extract {
+    pub(super) fn new(device: &wgpu::Device, placing: &Layouts) -> Extract {
         let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
         let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
             binding,
@@ -151,23 +214,31 @@ impl Extract {
             })
         };
         let (turn_triangles, raise_edges) = (pipeline("turn_triangles"), pipeline("raise_edges"));
-        Extract { layout, placed_layout: placed_layout.clone(), turn_triangles, raise_edges }
+        Extract { layout, placing: placing.clone(), turn_triangles, raise_edges }
     }
 
-    /// Runs both steps for all `stale` lists.
-    pub(super) fn run(&self, device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder, stale: &[&Lists]) {
+    /// Brings all stale volumes up to date: uniforms, then both steps.
+    pub(super) fn run(&self, device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder, stale: &[(&Lists, Stale)]) {
         if stale.is_empty() {
             return;
         }
         start_anew(device, encoder, stale);
+        let listed: Vec<(&GpuPart, &Listed)> = stale
+            .iter()
+            .filter(|(_, stale)| *stale == Stale::Lists)
+            .filter_map(|(lists, _)| Some((&*lists.part, lists.listed.as_ref()?)))
+            .collect();
+        if listed.is_empty() {
+            return;
+        }
         let mut pass =
             encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("volume extraction"), timestamp_writes: None });
         for (pipeline, count) in
             [(&self.turn_triangles, (|p| p.triangle_count) as fn(&GpuPart) -> u32), (&self.raise_edges, |p| p.edge_count)]
         {
             pass.set_pipeline(pipeline);
-            for lists in stale {
-                let groups = count(&lists.part).div_ceil(64);
+            for (part, lists) in &listed {
+                let groups = count(part).div_ceil(64);
                 let rows = groups.div_ceil(65_535);
                 pass.set_bind_group(0, &lists.bind_group, &[]);
                 pass.dispatch_workgroups(groups.div_ceil(rows), rows, 1);
@@ -175,55 +246,39 @@ impl Extract {
         }
     }
 
-    /// Lists for `wanted`, in the buffers of `old` where these fit. The flag says whether they must be made anew by
-    /// [`Extract::run`]. `None` where the device cannot hold them.
-    pub(super) fn lists(&self, device: &wgpu::Device, wanted: &Wanted<'_>, old: Option<Lists>) -> Option<(Lists, bool)> {
-        let key = Key {
-            uniform: CasterUniform::new(wanted.light, wanted.world_from_object, wanted.bounds_in_world, wanted.part),
-            positions: wanted.positions.clone(),
-            positions_revision: wanted.positions_revision,
-        };
-        let local_light = wanted.light.toward_light.w != 0.0;
-        let capacity = Capacity::new(wanted.part, local_light);
-        let lists = match old.filter(|o| o.local_light == local_light) {
-            Some(old) if old.key == key => return Some((old, false)),
-            Some(old) if old.key.positions == key.positions => Lists { key, ..old },
-            Some(old) => {
-                let (bind_group, placed) = self.bind_groups(device, wanted, [&old.uniform, &old.casts, &old.draws, &old.indices]);
-                Lists { key, bind_group, placed, ..old }
+    /// The volume for `wanted`, in the buffers of `old` where these fit, and what of it [`Extract::run`] must make anew.
+    /// `None` where the device cannot hold it.
+    pub(super) fn lists(&self, device: &wgpu::Device, wanted: &Wanted<'_>, old: Option<Lists>) -> Option<(Lists, Stale)> {
+        let uniform = CasterUniform::new(wanted.light, wanted.world_from_object, wanted.bounds_in_world, wanted.part);
+        let content = CasterUniform { reach_w: wanted.reach_w, ..uniform };
+        // How far vertices are thrown is nothing to the lists.
+        let key = Key { uniform, positions: wanted.positions.clone(), positions_revision: wanted.positions_revision };
+        let is_listed = wanted.light.settings.silhouettes == Silhouettes::Compute || wanted.part.widest_edge > WIDEST_EDGE;
+        let caster = wanted.caster;
+        Some(match old.filter(|o| o.listed.is_some() == is_listed) {
+            Some(old) if old.key == key && old.content == content => (Lists { caster, ..old }, Stale::No),
+            Some(old) if old.key == key => (Lists { caster, content, ..old }, Stale::Uniform),
+            Some(old) if old.key.positions == key.positions => (Lists { caster, content, key, ..old }, Stale::Lists),
+            old => {
+                let (uniform, listed) = match old {
+                    Some(old) => (old.uniform, old.listed.map(|l| (l.casts, l.draws, l.indices))),
+                    None => allocate(device, wanted.part, is_listed)?,
+                };
+                (self.bind(device, wanted, content, key, uniform, listed), Stale::Lists)
             }
-            None => {
-                let limits = device.limits();
-                if capacity.bytes() > limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) {
-                    return None;
-                }
-                self.allocate(device, wanted, key, &capacity)
-            }
-        };
-        Some((lists, true))
+        })
     }
 
-    fn allocate(&self, device: &wgpu::Device, wanted: &Wanted<'_>, key: Key, capacity: &Capacity) -> Lists {
-        use wgpu::BufferUsages as U;
-        let buffer = |label, size, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
-        };
-        let uniform = buffer("volume caster", size_of::<CasterUniform>() as u64, U::UNIFORM | U::COPY_DST);
-        let casts = buffer("volume casts", 4 * u64::from(wanted.part.triangle_count), U::STORAGE);
-        let draws = buffer("volume draws", 3 * DRAW_SIZE, U::STORAGE | U::INDIRECT | U::COPY_DST);
-        let indices = buffer("volume indices", capacity.bytes(), U::STORAGE | U::INDEX);
-        let (bind_group, placed) = self.bind_groups(device, wanted, [&uniform, &casts, &draws, &indices]);
-        let local_light = wanted.light.toward_light.w != 0.0;
-        Lists { part: wanted.part.clone(), indices, draws, placed, bind_group, uniform, casts, local_light, key }
-    }
-
-    /// Bind groups of extraction and draw, over uniform, casts, draws and indices.
-    fn bind_groups(
+    /// Binds buffers to what a volume is made of.
+    fn bind(
         &self,
         device: &wgpu::Device,
         wanted: &Wanted<'_>,
-        [uniform, casts, draws, indices]: [&wgpu::Buffer; 4],
-    ) -> (wgpu::BindGroup, wgpu::BindGroup) {
+        content: CasterUniform,
+        key: Key,
+        uniform: wgpu::Buffer,
+        listed: Option<(wgpu::Buffer, wgpu::Buffer, wgpu::Buffer)>,
+    ) -> Lists {
         let bind = |layout, buffers: &[&wgpu::Buffer]| {
             let entries: Vec<_> = (0u32..)
                 .zip(buffers)
@@ -231,31 +286,66 @@ impl Extract {
                 .collect();
             device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("volume caster"), layout, entries: &entries })
         };
-        let part = wanted.part;
-        let all = [uniform, wanted.positions, &part.triangles, &part.edges, &part.incidences, casts, draws, indices];
-        (bind(&self.layout, &all), bind(&self.placed_layout, &[uniform, wanted.positions]))
+        let part = wanted.part.clone();
+        let mut buffers = vec![&uniform, wanted.positions, &part.triangles, &part.edges, &part.incidences];
+        let (placed, listed) = match listed {
+            Some((casts, draws, indices)) => {
+                buffers.extend([&casts, &draws, &indices]);
+                let bind_group = bind(&self.layout, &buffers);
+                (bind(&self.placing.listed, &buffers[..2]), Some(Listed { indices, draws, bind_group, casts }))
+            }
+            None => {
+                buffers.push(&part.edge_of);
+                (bind(&self.placing.quads, &buffers), None)
+            }
+        };
+        Lists { part, caster: wanted.caster, placed, listed, uniform, content, key }
     }
 }
 
+/// The uniform, and where wanted casts, draws and indices; `None` where the device cannot hold them.
+#[allow(clippy::type_complexity, reason = "buffers on their way into Lists")]
+fn allocate(
+    device: &wgpu::Device,
+    part: &GpuPart,
+    is_listed: bool,
+) -> Option<(wgpu::Buffer, Option<(wgpu::Buffer, wgpu::Buffer, wgpu::Buffer)>)> {
+    use wgpu::BufferUsages as U;
+    let buffer = |label, size, usage| {
+        device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+    };
+    let limits = device.limits();
+    let capacity = Capacity::new(part);
+    if is_listed && capacity.bytes() > limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) {
+        return None;
+    }
+    let listed = is_listed.then(|| {
+        let casts = buffer("volume casts", 4 * u64::from(part.triangle_count), U::STORAGE);
+        let draws = buffer("volume draws", DRAWS_SIZE, U::STORAGE | U::INDIRECT | U::COPY_DST);
+        (casts, draws, buffer("volume indices", capacity.bytes(), U::STORAGE | U::INDEX))
+    });
+    Some((buffer("volume caster", size_of::<CasterUniform>() as u64, U::UNIFORM | U::COPY_DST), listed))
+}
+
 /// Fills uniforms and empties lists: one upload for all, since many small writes cost more than the lists themselves.
-fn start_anew(device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder, stale: &[&Lists]) {
-    const UNIFORM: u64 = size_of::<CasterUniform>() as u64;
-    let mut contents = Vec::with_capacity(stale.len() * (UNIFORM + 3 * DRAW_SIZE) as usize);
-    for lists in stale {
-        contents.extend_from_slice(bytemuck::bytes_of(&lists.key.uniform));
-        contents.extend_from_slice(bytemuck::cast_slice(&Capacity::new(&lists.part, lists.local_light).empty_draws()));
+fn start_anew(device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder, stale: &[(&Lists, Stale)]) {
+    let mut contents = Vec::new();
+    let mut copies = Vec::new();
+    for (lists, stale) in stale {
+        copies.push((&lists.uniform, contents.len() as u64, size_of::<CasterUniform>() as u64));
+        contents.extend_from_slice(bytemuck::bytes_of(&lists.content));
+        if let (Some(listed), Stale::Lists) = (&lists.listed, stale) {
+            copies.push((&listed.draws, contents.len() as u64, DRAWS_SIZE));
+            contents.extend_from_slice(bytemuck::cast_slice(&Capacity::new(&lists.part).empty_draws()));
+        }
     }
     let upload = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: Some("volume upload"),
         contents: &contents,
         usage: wgpu::BufferUsages::COPY_SRC,
     });
-    let mut at = 0;
-    for lists in stale {
-        for (buffer, size) in [(&lists.uniform, UNIFORM), (&lists.draws, 3 * DRAW_SIZE)] {
-            encoder.copy_buffer_to_buffer(&upload, at, buffer, 0, size);
-            at += size;
-        }
+    for (buffer, at, size) in copies {
+        encoder.copy_buffer_to_buffer(&upload, at, buffer, 0, size);
     }
 }
 
@@ -266,19 +356,19 @@ struct Capacity {
 }
 
 impl Capacity {
-    /// Every side of every triangle may stand alone: as one triangle to infinity under parallel light, else as two, with
-    /// a far cap for each triangle.
-    fn new(part: &GpuPart, local_light: bool) -> Capacity {
-        let per_triangle = if local_light { 3 * 6 + 3 } else { 3 * 3 };
-        Capacity { sides: part.triangle_count.saturating_mul(per_triangle), caps: part.triangle_count.saturating_mul(3) }
+    /// Every side of every triangle may stand alone, as two triangles; near and far caps are as many as triangles.
+    fn new(part: &GpuPart) -> Capacity {
+        Capacity { sides: part.triangle_count.saturating_mul(3 * 6), caps: part.triangle_count.saturating_mul(3) }
     }
 
     fn bytes(&self) -> u64 {
-        4 * (u64::from(self.sides) + u64::from(self.caps))
+        4 * (u64::from(self.sides) + 2 * u64::from(self.caps))
     }
 
-    fn empty_draws(&self) -> [Draw; 3] {
-        let first = [0, self.sides, self.sides.saturating_add(self.caps)];
+    /// Turned caps grow downwards from the end of the near caps.
+    fn empty_draws(&self) -> [Draw; 4] {
+        let end_of_caps = self.sides.saturating_add(self.caps);
+        let first = [0, self.sides, end_of_caps, end_of_caps];
         first.map(|first_index| Draw { instance_count: 1, first_index, ..Draw::default() })
     }
 }

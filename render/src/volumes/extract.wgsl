@@ -1,5 +1,5 @@
 // The volume of one caster under one light: lists of indices and the arguments of the draws that read them.
-// Vertex i of the mesh is index 2i where it is and 2i + 1 thrown to infinity, away from the light.
+// Vertex i of the mesh is index 2i where it is and 2i + 1 thrown away from the light.
 
 struct Draw {
     index_count: atomic<u32>,
@@ -9,14 +9,15 @@ struct Draw {
     first_instance: u32,
 };
 
-// Arguments of draw_indexed_indirect, in the order of `draw.rs`.
+// Arguments of draw_indexed_indirect, in the order of `extract.rs`.
 struct Draws {
     sides: Draw,
     caps: Draw,
     turned_caps: Draw,
+    far_caps: Draw,
 };
 
-// What each triangle casts: 1 as authored, -1 turned over, 0 nothing.
+// What each triangle casts.
 @group(0) @binding(5) var<storage, read_write> casts: array<i32>;
 @group(0) @binding(6) var<storage, read_write> draws: Draws;
 @group(0) @binding(7) var<storage, read_write> indices: array<u32>;
@@ -38,8 +39,7 @@ fn turn_triangles(
         return;
     }
     let t = triangles[i];
-    let f = facing(t);
-    let c = select(0, f, contributes(t, f));
+    let c = cast_of(t);
     casts[i] = c;
     if c == 0 {
         return;
@@ -53,12 +53,11 @@ fn turn_triangles(
         put(atomicSub(&draws.turned_caps.first_index, 3u) - 3u, 2u * t.x, 2u * t.y, 2u * t.z);
         atomicAdd(&draws.turned_caps.index_count, 3u);
     }
-    // The far cap looks away from the light. Parallel light has none: all its points are one.
-    if caster.toward_light.w != 0.0 {
-        let second = select(t.y, t.z, c > 0);
-        let third = select(t.z, t.y, c > 0);
-        put(atomicAdd(&draws.sides.index_count, 3u), 2u * t.x + 1u, 2u * second + 1u, 2u * third + 1u);
-    }
+    // The far cap looks away from the light.
+    let second = select(t.y, t.z, c > 0);
+    let third = select(t.z, t.y, c > 0);
+    let first = atomicLoad(&draws.far_caps.first_index);
+    put(first + atomicAdd(&draws.far_caps.index_count, 3u), 2u * t.x + 1u, 2u * second + 1u, 2u * third + 1u);
 }
 
 @compute @workgroup_size(64)
@@ -80,19 +79,11 @@ fn raise_edges(
     if sum == 0 {
         return;
     }
-    // The side runs against the triangles above it: p to q, then down to infinity.
+    // The side runs against the triangles above it: p to q, then away from the light. Under parallel light without end
+    // the second triangle is a point.
     let p = 2u * select(e.x, e.y, sum > 0);
     let q = 2u * select(e.y, e.x, sum > 0);
     let times = u32(abs(sum));
-    if caster.toward_light.w == 0.0 {
-        // All points meet at infinity.
-        var at = atomicAdd(&draws.sides.index_count, 3u * times);
-        for (var k = 0u; k < times; k++) {
-            put(at, p, q, q + 1u);
-            at += 3u;
-        }
-        return;
-    }
     var at = atomicAdd(&draws.sides.index_count, 6u * times);
     for (var k = 0u; k < times; k++) {
         put(at, p, q, q + 1u);

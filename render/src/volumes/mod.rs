@@ -2,8 +2,10 @@
 //!
 //! The one idea: every triangle is turned to face the light and casts its own volume; what neighbours share cancels
 //! before anything is drawn, because each edge carries the signed sum of its triangles (Kim, Kim, Turk 2008). Closed
-//! meshes leave their silhouette, open borders count once, edges of n faces count what they must. Volumes are counted
-//! where they lie behind the visible surface (z-fail, 000 section 3.2) and reach to infinity by w = 0 in world space.
+//! meshes leave their silhouette, open borders count once, edges of n faces count what they must. Volumes reach to
+//! infinity by w = 0 in world space (002), or until nothing is left that receives ([`reach`]). They are made once per
+//! frame and light; each view then counts them in front of the visible surface where that is safe and behind it
+//! elsewhere, and leaves out what it cannot see ([`choose`]).
 //!
 //! After [`VolumePass::draw`] the stencil is not 0 exactly where the job's light is hidden by one of the job's casters.
 //! The stencil counts layers of shadow in eight bits. Jobs that may hold more are drawn in groups of at most 127 layers,
@@ -16,14 +18,21 @@
 //! This module knows nothing of lighting, materials or how the stencil is used afterwards.
 
 mod cache;
+mod choose;
 mod draw;
 mod extract;
+mod hull;
 mod parts;
+mod reach;
 
-use extract::{Lists, Wanted};
-use glam::{Mat4, Vec4};
+pub use choose::Sight;
+
+use choose::Watch;
+use extract::{Lists, Stale, Wanted};
+use glam::{Mat4, Vec3, Vec4};
+use reach::Reach;
 use std::sync::Arc;
-use umbriel_scene::{Aabb, Mesh};
+use umbriel_scene::{Aabb, Mesh, VolumeSettings};
 
 /// One light and what stands in it.
 #[derive(Clone, Debug)]
@@ -32,6 +41,8 @@ pub struct VolumeJob {
     pub light: VolumeLight,
     /// What casts.
     pub casters: Vec<VolumeCaster>,
+    /// Box around everything that shadows may fall on, in any view; [`Aabb::EMPTY`] leaves it open.
+    pub receivers: Aabb,
 }
 
 /// The light of a job, in the world.
@@ -39,8 +50,21 @@ pub struct VolumeJob {
 pub struct VolumeLight {
     /// w = 1: position of a point or spot light, metres. w = 0: unit vector towards a directional light.
     pub toward_light: Vec4,
-    /// Reach of the light, metres; infinite where unlimited.
+    /// Reach of the light, metres; infinite where unlimited. Shadows end a little beyond.
     pub range: f32,
+    /// The cone outside of which shadows do not count.
+    pub cone: Option<Cone>,
+    /// How its volumes are made and counted.
+    pub settings: VolumeSettings,
+}
+
+/// The cone of a spot light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    /// Unit vector along its axis, away from the light.
+    pub direction: Vec3,
+    /// Half angle, radians.
+    pub outer_rad: f32,
 }
 
 /// A mesh at a place.
@@ -56,6 +80,18 @@ pub struct VolumeCaster {
     pub world_from_object: Mat4,
     /// Box around it in the world, deformation included; [`Aabb::EMPTY`] where unknown (slower, and as exact).
     pub bounds_in_world: Aabb,
+    /// What of it is seen.
+    pub surface: Surface,
+}
+
+/// What of a caster's surface is in the depth buffer, wherever a view shows it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Surface {
+    /// All of it, from both sides.
+    BothSides,
+    /// Not all: it is half-transparent, has holes, or is not drawn from behind.
+    #[default]
+    InParts,
 }
 
 /// What a frame's [`VolumePass::prepare`] did.
@@ -67,9 +103,26 @@ pub struct VolumeStats {
     pub kept: usize,
     /// Casters left out: no triangles, a position buffer that is too small, or lists too large for the device.
     pub left_out: usize,
+    /// Casters whose shadow falls on nothing that receives.
+    pub without_receiver: usize,
     /// Lists of meshes with so many loose pieces that these may put more than 255 layers over a point. Where it is an
     /// exact multiple of 128, the point is lit.
     pub may_wrap: usize,
+}
+
+/// What was drawn of a job in one view.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct VolumeDraws {
+    /// Casters counted in front of what is seen.
+    pub z_pass: u32,
+    /// Casters counted behind it.
+    pub z_fail: u32,
+    /// Casters left out because nothing of their shadow can be seen.
+    pub culled: u32,
+    /// Casters drawn with their near caps.
+    pub near_caps: u32,
+    /// Casters drawn with their far caps.
+    pub far_caps: u32,
 }
 
 /// Makes and draws the volumes of all jobs of a frame.
@@ -77,7 +130,16 @@ pub struct VolumePass {
     extract: extract::Extract,
     drawing: draw::Drawing,
     meshes: cache::MeshCache,
-    jobs: Vec<Vec<Lists>>,
+    jobs: Vec<Prepared>,
+}
+
+/// A job of the frame.
+#[derive(Default)]
+struct Prepared {
+    light: Option<VolumeLight>,
+    /// Bounds, surface and reach of each caster that is drawn.
+    casters: Vec<(Aabb, Surface, Reach)>,
+    lists: Vec<Lists>,
 }
 
 impl VolumePass {
@@ -91,11 +153,11 @@ impl VolumePass {
         colour_format: Option<wgpu::TextureFormat>,
         view_layout: &wgpu::BindGroupLayout,
     ) -> VolumePass {
-        let placed_layout = draw::placed_layout(device);
+        let layouts = draw::Layouts::new(device);
         let target = draw::Target { depth_stencil_format, sample_count, colour_format };
         VolumePass {
-            extract: extract::Extract::new(device, &placed_layout),
-            drawing: draw::Drawing::new(device, target, view_layout, &placed_layout),
+            extract: extract::Extract::new(device, &layouts),
+            drawing: draw::Drawing::new(device, target, view_layout, &layouts),
             meshes: cache::MeshCache::default(),
             jobs: Vec::new(),
         }
@@ -108,9 +170,13 @@ impl VolumePass {
         let mut stale = Vec::new();
         let mut old_jobs = std::mem::take(&mut self.jobs).into_iter();
         for (j, job) in jobs.iter().enumerate() {
-            let mut old = OldLists::new(old_jobs.next().unwrap_or_default());
-            let mut lists = Vec::new();
+            let mut old = OldLists::new(old_jobs.next().unwrap_or_default().lists);
+            let mut prepared = Prepared { light: Some(job.light), ..Prepared::default() };
             for caster in &job.casters {
+                let Some(reach) = reach::reach(&job.light, &caster.bounds_in_world, &job.receivers) else {
+                    stats.without_receiver += 1;
+                    continue;
+                };
                 let pieces = self.meshes.parts(device, &caster.mesh);
                 if pieces.is_empty() || caster.positions.size() < 12 * caster.mesh.positions.len() as u64 {
                     stats.left_out += 1;
@@ -120,29 +186,33 @@ impl VolumePass {
                     let wanted = Wanted {
                         light: &job.light,
                         part,
+                        caster: prepared.casters.len(),
                         positions: &caster.positions,
                         positions_revision: caster.positions_revision,
                         world_from_object: caster.world_from_object,
                         bounds_in_world: &caster.bounds_in_world,
+                        reach_w: reach.w(),
                     };
                     stats.may_wrap += usize::from(part.layers > parts::STENCIL_LAYERS);
-                    match self.extract.lists(device, &wanted, old.take(part)) {
-                        Some((made, anew)) => {
-                            if anew {
-                                stale.push((j, lists.len()));
-                                stats.extracted += 1;
-                            } else {
-                                stats.kept += 1;
-                            }
-                            lists.push(made);
-                        }
-                        None => stats.left_out += 1,
+                    let Some((made, is_stale)) = self.extract.lists(device, &wanted, old.take(part)) else {
+                        stats.left_out += 1;
+                        continue;
+                    };
+                    match is_stale {
+                        Stale::Lists => stats.extracted += 1,
+                        Stale::No | Stale::Uniform => stats.kept += 1,
                     }
+                    self.drawing.make(device, &made);
+                    if is_stale != Stale::No {
+                        stale.push((j, prepared.lists.len(), is_stale));
+                    }
+                    prepared.lists.push(made);
                 }
+                prepared.casters.push((caster.bounds_in_world, caster.surface, reach));
             }
-            self.jobs.push(lists);
+            self.jobs.push(prepared);
         }
-        let stale: Vec<&Lists> = stale.into_iter().map(|(job, place)| &self.jobs[job][place]).collect();
+        let stale: Vec<_> = stale.into_iter().map(|(job, place, stale)| (&self.jobs[job].lists[place], stale)).collect();
         self.extract.run(device, encoder, &stale);
         self.meshes.forget_dead();
         stats
@@ -150,11 +220,76 @@ impl VolumePass {
 
     /// Counts the volumes of a job into the stencil, which must be 0 in the viewport; afterwards it is 0 where the light
     /// shines. Depth is read, stencil written, colour untouched; the stencil reference is changed. Depth is reversed,
-    /// with its far plane at infinity, and cleared to 0.
-    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, job: usize, view: &wgpu::BindGroup) {
-        if let Some(lists) = self.jobs.get(job) {
-            self.drawing.run(pass, lists, view);
+    /// with its far plane at infinity, and cleared to 0. `view` is the View uniform of the view that `sight` tells of;
+    /// the viewport is the whole target, of the view's size.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, job: usize, view: &wgpu::BindGroup, sight: &Sight) -> VolumeDraws {
+        let mut draws = VolumeDraws::default();
+        let Some((job, light)) = self.jobs.get(job).and_then(|j| Some((j, j.light.as_ref()?))) else { return draws };
+        let watch = Watch::new(sight, light);
+        let choices = job.casters.iter().map(|(bounds, surface, reach)| watch.choose(bounds, *surface, reach));
+        let choices: Vec<_> = choices.collect();
+        for choice in &choices {
+            match choice {
+                None => draws.culled += 1,
+                Some(choice) => {
+                    *(if choice.z_fail { &mut draws.z_fail } else { &mut draws.z_pass }) += 1;
+                    draws.near_caps += u32::from(choice.near_caps);
+                    draws.far_caps += u32::from(choice.far_caps);
+                }
+            }
         }
+        let shown: Vec<_> = job.lists.iter().filter_map(|lists| Some((lists, choices[lists.caster]?))).collect();
+        if !shown.is_empty() {
+            self.drawing.run(pass, &shown, sight.whole(), view);
+        }
+        draws
+    }
+}
+
+impl VolumeDraws {
+    /// Adds what was drawn in another view.
+    pub fn add(&mut self, other: &VolumeDraws) {
+        self.z_pass += other.z_pass;
+        self.z_fail += other.z_fail;
+        self.culled += other.culled;
+        self.near_caps += other.near_caps;
+        self.far_caps += other.far_caps;
+    }
+}
+
+impl VolumeLight {
+    /// Box of where it shines; without end where that is unknown.
+    fn bounds(&self) -> Aabb {
+        let everything = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
+        if self.toward_light.w == 0.0 {
+            return everything;
+        }
+        let extent = |axis: Vec3| match self.cone {
+            None => self.range,
+            Some(cone) => {
+                // The farthest point of the cone along an axis: at its rim, or on the axis itself where that is inside.
+                let off_rad = cone.direction.angle_between(axis) - cone.outer_rad;
+                if off_rad <= 0.0 {
+                    self.range
+                } else if off_rad < std::f32::consts::FRAC_PI_2 {
+                    self.range * off_rad.cos()
+                } else {
+                    0.0
+                }
+            }
+        };
+        let position = self.toward_light.truncate();
+        let margin = 1e-3 + 1e-5 * position.abs().max_element();
+        let reach = |sign: f32| Vec3::from_array(Vec3::AXES.map(|axis| extent(sign * axis) + margin));
+        Aabb { min: position - reach(-1.0), max: position + reach(1.0) }
+    }
+
+    /// Is a box outside of the cone for certain?
+    fn misses(&self, bounds: &Aabb) -> bool {
+        let Some(cone) = self.cone else { return false };
+        let to_centre = bounds.centre() - self.toward_light.truncate();
+        let (distance, radius) = (to_centre.length(), 1.001 * bounds.radius());
+        distance > radius && to_centre.angle_between(cone.direction) > cone.outer_rad + (radius / distance).asin() + 1e-3
     }
 }
 

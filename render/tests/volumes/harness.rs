@@ -2,8 +2,8 @@
 
 use crate::shapes::Thing;
 use glam::{Mat4, Vec4};
-use umbriel_render::volumes::{VolumeCaster, VolumeJob, VolumeLight, VolumePass, VolumeStats};
-use umbriel_scene::{Aabb, View};
+use umbriel_render::volumes::{Sight, Surface, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats};
+use umbriel_scene::{Aabb, View, VolumeSettings};
 use wgpu::util::DeviceExt;
 
 pub(crate) const VIEW: &str = include_str!("../../src/shaders/view.wgsl");
@@ -19,12 +19,15 @@ fn surface(@location(0) p: vec3<f32>) -> @builtin(position) @invariant vec4<f32>
 const COPY: &str = "
 @group(0) @binding(0) var stencil: TEXTURE<u32>;
 @group(0) @binding(1) var<storage, read_write> copied: array<u32>;
+@group(0) @binding(2) var depth: DEPTH;
 @compute @workgroup_size(8, 8)
 fn copy(@builtin(global_invocation_id) id: vec3<u32>) {
     let size = textureDimensions(stencil);
     if any(id.xy >= size) { return; }
     for (var s = 0; s < SAMPLES; s++) {
-        copied[(id.y * size.x + id.x) * u32(SAMPLES) + u32(s)] = textureLoad(stencil, id.xy, s).x;
+        // Where nothing is seen there is nothing to be in shadow.
+        let seen = textureLoad(depth, id.xy, s) > 0.0;
+        copied[(id.y * size.x + id.x) * u32(SAMPLES) + u32(s)] = select(0u, textureLoad(stencil, id.xy, s).x, seen);
     }
 }
 ";
@@ -71,6 +74,7 @@ impl Loaded {
             } else {
                 Aabb::EMPTY
             },
+            surface: Surface::BothSides,
         }
     }
 }
@@ -144,14 +148,14 @@ impl Gpu {
         })
     }
 
-    /// The stencil of each sample of each pixel, rows from the top.
+    /// The stencil of each sample of each pixel, rows from the top; 0 where nothing is seen.
     pub(crate) fn stencil(
         &mut self,
         casters: &[Loaded],
         receivers: &[Loaded],
         light: VolumeLight,
         view: &View,
-    ) -> (Vec<u32>, VolumeStats) {
+    ) -> (Vec<u32>, VolumeStats, VolumeDraws) {
         let mut view_data = [0f32; 60];
         let clip_from_world: Mat4 = view.frustum.clip_from_view() * view.view_from_world;
         view_data[..16].copy_from_slice(&clip_from_world.to_cols_array());
@@ -160,10 +164,13 @@ impl Gpu {
         let target_view = target.create_view(&Default::default());
         let colour = self.texture(view, COLOUR).create_view(&Default::default());
         let mut encoder = self.device.create_command_encoder(&Default::default());
-        let job = VolumeJob { light, casters: casters.iter().map(Loaded::caster).collect() };
+        let all = casters.iter().chain(receivers).map(|l| l.caster().bounds_in_world);
+        let receives = if all.clone().any(|b| b.is_empty()) { Aabb::EMPTY } else { all.fold(Aabb::EMPTY, Aabb::union) };
+        let job = VolumeJob { light, casters: casters.iter().map(Loaded::caster).collect(), receivers: receives };
+        let sight = Sight::new(view, receives);
         let stats = self.pass.prepare(&self.device, &mut encoder, &[job]);
         self.surfaces(&mut encoder, casters.iter().chain(receivers), &view_group, &target_view);
-        {
+        let draws = {
             let colours = [(self.samples > 1).then_some(wgpu::RenderPassColorAttachment {
                 view: &colour,
                 depth_slice: None,
@@ -180,9 +187,9 @@ impl Gpu {
                 }),
                 ..Default::default()
             });
-            self.pass.draw(&mut pass, 0, &view_group);
-        }
-        (self.read_back(encoder, &target, view), stats)
+            self.pass.draw(&mut pass, 0, &view_group, &sight)
+        };
+        (self.read_back(encoder, &target, view), stats, draws)
     }
 
     fn surfaces<'a>(
@@ -223,14 +230,15 @@ impl Gpu {
             |usage| self.device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false });
         let copied = buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
         let mapped = buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
-        let stencil =
-            target.create_view(&wgpu::TextureViewDescriptor { aspect: wgpu::TextureAspect::StencilOnly, ..Default::default() });
+        let aspect = |aspect| target.create_view(&wgpu::TextureViewDescriptor { aspect, ..Default::default() });
+        let (stencil, depth) = (aspect(wgpu::TextureAspect::StencilOnly), aspect(wgpu::TextureAspect::DepthOnly));
         let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &self.copy.get_bind_group_layout(0),
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&stencil) },
                 wgpu::BindGroupEntry { binding: 1, resource: copied.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(&depth) },
             ],
         });
         {
@@ -293,9 +301,11 @@ fn surface_pipeline(
 
 fn copy_pipeline(device: &wgpu::Device, samples: u32) -> wgpu::ComputePipeline {
     let texture = if samples == 1 { "texture_2d" } else { "texture_multisampled_2d" };
+    let depth = if samples == 1 { "texture_depth_2d" } else { "texture_depth_multisampled_2d" };
     let index = if samples == 1 { "0" } else { "s" };
     let source = COPY
         .replace("TEXTURE", texture)
+        .replace("DEPTH", depth)
         .replace("SAMPLES", &samples.to_string())
         .replace("id.xy, s)", &format!("id.xy, {index})"));
     let module = device
@@ -313,5 +323,5 @@ fn copy_pipeline(device: &wgpu::Device, samples: u32) -> wgpu::ComputePipeline {
 /// A light in the direction `v` (w = 0) or at the place `v` (w = 1).
 pub(crate) fn light(v: Vec4) -> VolumeLight {
     let toward_light = if v.w == 0.0 { v.normalize() } else { v };
-    VolumeLight { toward_light, range: f32::INFINITY }
+    VolumeLight { toward_light, range: f32::INFINITY, cone: None, settings: VolumeSettings::default() }
 }

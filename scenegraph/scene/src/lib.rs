@@ -19,6 +19,7 @@ mod score;
 mod tangents;
 mod trace;
 mod view;
+mod volume;
 
 pub use adjacency::{Edge, Edges};
 pub use bounds::Aabb;
@@ -31,3 +32,4 @@ pub use score::{Score, difference, score};
 pub use tangents::tangents;
 pub use trace::{Mask, MaskError, PenumbraScore, Shares, TraceError, TraceOptions, Tracer, trace_visibility};
 pub use view::{Frustum, Layout, Picture, PictureKind, Rect, View};
+pub use volume::{Silhouettes, VolumeCounting, VolumeSettings};

@@ -1,5 +1,6 @@
 //! Light sources and how each casts its shadows.
 
+use crate::VolumeSettings;
 use glam::Vec3;
 
 /// A light source in world space.
@@ -35,6 +36,8 @@ pub struct Light {
     pub soft: bool,
     /// Settings of the shadow map, read when `shadows` is [`ShadowMethod::Map`].
     pub map: MapSettings,
+    /// Settings of the shadow volumes, read when `shadows` is [`ShadowMethod::Volume`] and by stencil groups.
+    pub volume: VolumeSettings,
 }
 
 /// Kind of a light source.
@@ -131,6 +134,7 @@ impl Default for Light {
             size: 0.0,
             soft: false,
             map: MapSettings::default(),
+            volume: VolumeSettings::default(),
         }
     }
 }

@@ -5,7 +5,7 @@ use super::read::{Reader, label};
 use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
 use std::f32::consts::PI;
 use umbriel_fields::{Graph, NodeId};
-use umbriel_scene::{Light, LightKind, MapFilter, MapSettings, ShadowMethod};
+use umbriel_scene::{Light, LightKind, MapFilter, MapSettings, ShadowMethod, Silhouettes, VolumeCounting, VolumeSettings};
 
 /// One place of a light in the world.
 pub(super) struct LightEntry {
@@ -64,6 +64,7 @@ pub(super) fn read_light(graph: &Graph, node: NodeId, problems: &mut Problems) -
     light.shadow_intensity *= 1.0 - brightness(&read, &mut check);
     light.size = size(&read, parallel, &mut check);
     light.map = map_settings(&read, parallel, &mut check);
+    light.volume = volume_settings(&read, &mut check);
     Some(light)
 }
 
@@ -140,6 +141,18 @@ fn map_settings(read: &Reader<'_>, parallel: bool, check: &mut Check<'_>) -> Map
     }
 }
 
+fn volume_settings(read: &Reader<'_>, check: &mut Check<'_>) -> VolumeSettings {
+    let floor: f32 = check.finite("volume_floor", read.get("volume_floor"), f32::NEG_INFINITY, |h: &f32| *h < f32::INFINITY);
+    VolumeSettings {
+        counting: [VolumeCounting::Auto, VolumeCounting::ZFail][usize::from(read.choice("volume_counting") == 1)],
+        silhouettes: [Silhouettes::Compute, Silhouettes::Quads][usize::from(read.choice("volume_silhouettes") == 1)],
+        culling: read.get("volume_culling"),
+        fitted: read.get("volume_fitted"),
+        length: check.finite("volume_length", read.get("volume_length"), f32::INFINITY, |l: &f32| *l > 0.0),
+        lower_plane: floor.is_finite().then(|| Vec3::Y.extend(-floor)),
+    }
+}
+
 /// Reports values that make no sense and gives the usual one instead.
 struct Check<'a> {
     graph: &'a Graph,
@@ -177,6 +190,13 @@ pub(super) fn place_light(local: &Light, room_from_local: &Mat4, world_per_room:
     let scaled = |v: f32| v * stretch;
     light.map.near_far = local.map.near_far.map(|d| d.map(scaled));
     light.map.constant_bias = local.map.constant_bias.map(scaled);
+    light.volume.length *= stretch;
+    // Planes go by the inverse transpose; distances to them in metres of the room.
+    light.volume.lower_plane = local.volume.lower_plane.and_then(|plane| {
+        let plane = room_from_local.inverse().transpose() * plane;
+        let length = plane.truncate().length();
+        (length > 0.0 && plane.is_finite()).then(|| plane / length)
+    });
     if local.kind == LightKind::Directional {
         light.map.frustum = local.map.frustum.map(|f| f.map(scaled));
     }

@@ -38,6 +38,17 @@ fn common(intensity: f32, unit: &'static str) -> Vec<Field> {
             .unit("m")
             .alias("shadow_displace_offset")
             .doc("Constant bias; negative: tunes itself."),
+        Field::choice("volume_counting", &["auto", "z_fail"], "auto")
+            .alias("volume_caps")
+            .doc("Where shadow volumes are counted. auto: in front of what is seen where that is safe, else behind it."),
+        Field::choice("volume_silhouettes", &["compute", "quads"], "compute")
+            .doc("How silhouettes are found: once for all views, or by degenerate quads in each view (000 section 4.2)."),
+        Field::new("volume_culling", true).doc("Leaves out shadow volumes and caps that cannot be seen."),
+        Field::new("volume_fitted", true).doc("Shadow volumes end behind the last shape that receives, not at infinity."),
+        Field::new("volume_length", f32::INFINITY).unit("m").doc("Volume shadows end this far behind what casts them."),
+        Field::new("volume_floor", f32::NEG_INFINITY)
+            .unit("m")
+            .doc("Height below which nothing is seen, such as that of the sea; volumes end there."),
         Field::choice("filter", &["none", "hardware", "pcf4", "pcf16"], "pcf16").doc("How the map is looked up."),
     ]
 }

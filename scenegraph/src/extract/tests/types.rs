@@ -5,7 +5,9 @@ use crate::nodes::{environment, new_graph, node_types};
 use glam::{Mat4, Vec2, Vec3, Vec4, vec3};
 use std::f32::consts::PI;
 use umbriel_fields::Value;
-use umbriel_scene::{AlphaMode, Background, LightKind, MapFilter, MapSettings, Shading, ShadowMethod};
+use umbriel_scene::{
+    AlphaMode, Background, LightKind, MapFilter, MapSettings, Shading, ShadowMethod, Silhouettes, VolumeCounting, VolumeSettings,
+};
 
 #[test]
 fn every_type_is_declared_well_and_found_by_all_its_names() {
@@ -165,6 +167,40 @@ fn the_light_of_the_paper() {
         filter: MapFilter::Pcf16,
     };
     assert_eq!(found.map, expected);
+}
+
+#[test]
+fn settings_of_volumes_are_read_and_follow_the_room() {
+    let mut w = World::new();
+    let lift = w.below(&[w.root()], "Transform", "lift");
+    w.set(lift, "translation", vec3(0.0, 5.0, 0.0));
+    w.set(lift, "scale", vec3(2.0, 2.0, 2.0));
+    let light = w.below(&[lift], "PointLight", "lamp");
+    w.update();
+    assert_eq!(w.light(light).volume, VolumeSettings::default());
+    w.set(light, "volume_counting", "z_fail");
+    w.set(light, "volume_silhouettes", "quads");
+    w.set(light, "volume_culling", false);
+    w.set(light, "volume_fitted", false);
+    w.set(light, "volume_length", 3.0f32);
+    w.set(light, "volume_floor", -1.0f32);
+    w.update();
+    assert!(w.problems().is_empty());
+    let expected = VolumeSettings {
+        counting: VolumeCounting::ZFail,
+        silhouettes: Silhouettes::Quads,
+        culling: false,
+        fitted: false,
+        length: 6.0,
+        lower_plane: Some(Vec4::new(0.0, 1.0, 0.0, -3.0)),
+    };
+    assert_eq!(w.light(light).volume, expected);
+    w.set(light, "volume_length", -1.0f32);
+    w.set(light, "volume_floor", f32::INFINITY);
+    w.update();
+    assert_eq!(w.problems().len(), 2);
+    let found = w.light(light).volume;
+    assert_eq!((found.length, found.lower_plane), (f32::INFINITY, None));
 }
 
 #[test]
