@@ -46,6 +46,7 @@ pub(crate) fn jobs(
         }
         let light = &scene.lights[group.light];
         let [r, g, b, a] = film.color.to_array();
+        let a = a * light.shadow_intensity.clamp(0.0, 1.0);
         let film = films.push(&uniforms::Film { color: [r * a, g * a, b * a, a] });
         let casters = group.casters.iter().filter_map(|i| caster(*i)).collect();
         // A film darkens what is outside of the cone too.

@@ -5,6 +5,8 @@ use wgpu::{BindGroupLayout, BindGroupLayoutEntry, BindingType, ShaderStages};
 /// The layouts, made once.
 pub(crate) struct Layouts {
     pub(crate) view: BindGroupLayout,
+    /// The view with the shadow texture of its one light.
+    pub(crate) soft_view: BindGroupLayout,
     pub(crate) instances: BindGroupLayout,
     pub(crate) material: BindGroupLayout,
     pub(crate) lighting: BindGroupLayout,
@@ -38,6 +40,11 @@ impl Layouts {
         let uniform = wgpu::BufferBindingType::Uniform;
         Layouts {
             view: layout(device, "view", &[buffer(0, ShaderStages::VERTEX_FRAGMENT, uniform)]),
+            soft_view: layout(
+                device,
+                "view, soft shadow",
+                &[buffer(0, ShaderStages::VERTEX_FRAGMENT, uniform), texture(1, unfiltered), texture(2, unfiltered)],
+            ),
             instances: layout(device, "instances", &[buffer(0, ShaderStages::VERTEX, read)]),
             material: layout(device, "material", &material),
             lighting: layout(device, "lighting", &lighting),

@@ -26,6 +26,7 @@ mod renderer;
 mod screen;
 mod shaders;
 mod slots;
+mod soft;
 mod stats;
 mod surface;
 mod surroundings;

@@ -4,6 +4,7 @@ use crate::cull::Planes;
 use crate::draws::{Alpha, Draw, Draws};
 use crate::lights::Lights;
 use crate::slots::Slots;
+use crate::soft::SoftJob;
 use crate::stats::{FrameStats, Problems};
 use crate::surface::Pass;
 use crate::volumes::Sight;
@@ -36,6 +37,8 @@ pub(crate) struct ViewPlan {
 /// A job of the shadow volumes, and what follows it.
 pub(crate) struct Step {
     pub(crate) job: usize,
+    /// By a shadow texture, not by the stencil alone: the jobs of its layers.
+    pub(crate) soft: Option<Vec<usize>>,
     pub(crate) then: Then,
 }
 
@@ -63,6 +66,8 @@ pub(crate) struct Frame<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) lights: &'a Lights,
     pub(crate) purposes: &'a [Purpose],
+    /// The soft ones among them.
+    pub(crate) soft: &'a [Option<SoftJob>],
 }
 
 impl ViewPlan {
@@ -70,8 +75,13 @@ impl ViewPlan {
         if self.is_visibility { Pass::Visibility } else { Pass::Base }
     }
 
-    pub(crate) fn add_pass(&self) -> Pass {
-        if self.is_visibility { Pass::VisibilityAdd } else { Pass::Add }
+    pub(crate) fn add_pass(&self, is_soft: bool) -> Pass {
+        match (self.is_visibility, is_soft) {
+            (true, false) => Pass::VisibilityAdd,
+            (true, true) => Pass::VisibilitySoft,
+            (false, false) => Pass::Add,
+            (false, true) => Pass::AddSoft,
+        }
     }
 }
 
@@ -160,7 +170,7 @@ pub(crate) fn plan_picture(
                 Purpose::Film { film, .. } if !is_visibility => Then::Film { slot: film },
                 _ => continue,
             };
-            steps.push(Step { job, then });
+            steps.push(Step { job, soft: frame.soft[job].as_ref().map(|s| s.layers.clone()), then });
         }
         let seen = opaque.iter().flat_map(|d| draws.visible_of(d)).map(|i| *i as usize);
         let sight = Sight::new(view, jobs::receivers(seen, frame.scene));

@@ -8,6 +8,7 @@ use crate::maps::Maps;
 use crate::plan::{Then, ViewPlan};
 use crate::screen::Screen;
 use crate::slots::Slots;
+use crate::soft::{SoftPass, SoftTarget};
 use crate::stats::FrameStats;
 use crate::surface::{Pass, Surface};
 use crate::targets::{Layer, ViewTarget};
@@ -75,7 +76,9 @@ pub(crate) struct Recorder<'a> {
     pub(crate) drawer: &'a Drawer<'a>,
     pub(crate) surface: &'a Surface,
     pub(crate) screen: &'a Screen,
+    pub(crate) device: &'a wgpu::Device,
     pub(crate) volumes: &'a VolumePass,
+    pub(crate) soft: &'a SoftPass,
     pub(crate) views: &'a Slots<uniforms::View>,
     pub(crate) films: &'a Slots<uniforms::Film>,
     pub(crate) lighting: Option<&'a wgpu::BindGroup>,
@@ -95,7 +98,7 @@ impl Recorder<'_> {
     /// One view: surfaces, then light and films by shadow volumes, then what is half-transparent.
     pub(crate) fn view(&mut self, encoder: &mut wgpu::CommandEncoder, view: &ViewPlan, to: &ViewTarget) {
         let is_last = view.steps.is_empty();
-        let mut pass = begin_view(encoder, self.clock, "surfaces", to, true, is_last);
+        let mut pass = begin_view(encoder, self.clock, "surfaces", to, Part { is_first: true, is_last, keeps_stencil: false });
         pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
         self.surfaces(&mut pass, &view.opaque, view.base_pass());
         if !view.is_visibility {
@@ -104,20 +107,17 @@ impl Recorder<'_> {
             pass.draw(0..3, 0..1);
         }
         for (number, step) in view.steps.iter().enumerate() {
-            if is_last {
-                break;
-            }
             drop(pass);
-            pass = begin_view(encoder, self.clock, "shadow volumes", to, false, number + 1 == view.steps.len());
-            let drawn = self.volumes.draw(&mut pass, step.job, self.views.group(view.base_slot), &view.sight);
-            self.stats.volumes.add(&drawn);
-            pass.set_stencil_reference(0);
-            pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
-            self.surfaces(&mut pass, &view.exempt, Pass::Exempt);
+            let is_last = number + 1 == view.steps.len();
+            if let (Some(layers), Some(soft)) = (&step.soft, &to.soft) {
+                pass = self.soft_step(encoder, view, (&step.then, layers), (to, soft), is_last);
+                continue;
+            }
+            pass = self.counted(encoder, view, step.job, to, Part { is_first: false, is_last, keeps_stencil: false });
             match step.then {
                 Then::Light { slot } => {
                     pass.set_bind_group(0, self.views.group(slot), &[]);
-                    self.surfaces(&mut pass, &view.opaque, view.add_pass());
+                    self.surfaces(&mut pass, &view.opaque, view.add_pass(false));
                 }
                 Then::Film { slot } => {
                     pass.set_pipeline(&self.screen.film);
@@ -128,6 +128,52 @@ impl Recorder<'_> {
         }
         pass.set_bind_group(0, self.views.group(view.blend_slot), &[]);
         self.surfaces(&mut pass, &view.blended, Pass::Blend);
+    }
+
+    /// A pass whose stencil holds the counts of a job's volumes.
+    fn counted<'e>(
+        &mut self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        view: &ViewPlan,
+        job: usize,
+        to: &ViewTarget,
+        part: Part,
+    ) -> wgpu::RenderPass<'e> {
+        let mut pass = begin_view(encoder, self.clock, "shadow volumes", to, part);
+        let drawn = self.volumes.draw(&mut pass, job, self.views.group(view.base_slot), &view.sight);
+        self.stats.volumes.add(&drawn);
+        pass.set_stencil_reference(0);
+        pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
+        self.surfaces(&mut pass, &view.exempt, Pass::Exempt);
+        pass
+    }
+
+    /// Light or film by the shadow texture that is made of the stencil, layer by layer. The pass that is left open is the
+    /// view's.
+    fn soft_step<'e>(
+        &mut self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        view: &ViewPlan,
+        (then, layers): (&Then, &[usize]),
+        (to, soft): (&ViewTarget, &SoftTarget),
+        is_last: bool,
+    ) -> wgpu::RenderPass<'e> {
+        for (number, &job) in layers.iter().enumerate() {
+            drop(self.counted(encoder, view, job, to, Part { is_first: false, is_last: false, keeps_stencil: true }));
+            self.soft.draw(self.device, encoder, self.clock, (job, self.views.group(view.base_slot)), (soft, number == 0));
+        }
+        let slot = if let Then::Light { slot } = *then { slot } else { view.base_slot };
+        let soft_view = self.soft.passes.view_group(self.device, self.views.binding(slot), soft);
+        if let Then::Film { slot } = *then {
+            let groups = (&soft_view, self.films.group(slot));
+            self.soft.passes.film(self.device, encoder, self.clock, groups, (soft, &to.samples));
+        }
+        let mut pass = begin_view(encoder, self.clock, "soft light", to, Part { is_first: false, is_last, keeps_stencil: false });
+        if let Then::Light { .. } = then {
+            pass.set_bind_group(0, &soft_view, &[]);
+            self.surfaces(&mut pass, &view.opaque, view.add_pass(true));
+        }
+        pass
     }
 
     fn surfaces(&mut self, pass: &mut wgpu::RenderPass<'_>, draws: &[Draw], kind_of_pass: Pass) {
@@ -181,30 +227,38 @@ pub(crate) fn begin_colour<'e>(
     })
 }
 
+/// Place of a pass among those of a view.
+struct Part {
+    is_first: bool,
+    is_last: bool,
+    /// A later pass reads what is counted here.
+    keeps_stencil: bool,
+}
+
 /// A pass into a view. The first fills depth, later ones read it and start with an empty stencil; the last resolves.
 fn begin_view<'e>(
     encoder: &'e mut wgpu::CommandEncoder,
     clock: &Clock,
     label: &'static str,
     to: &ViewTarget,
-    is_first: bool,
-    is_last: bool,
+    part: Part,
 ) -> wgpu::RenderPass<'e> {
-    let store = if is_last { StoreOp::Discard } else { StoreOp::Store };
-    let load = if is_first { LoadOp::Clear(wgpu::Color::BLACK) } else { LoadOp::Load };
+    let kept = |is_kept| if is_kept { StoreOp::Store } else { StoreOp::Discard };
+    let store = kept(!part.is_last);
+    let load = if part.is_first { LoadOp::Clear(wgpu::Color::BLACK) } else { LoadOp::Load };
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some(label),
         timestamp_writes: clock.render(label),
         color_attachments: &[Some(wgpu::RenderPassColorAttachment {
             view: &to.samples,
             depth_slice: None,
-            resolve_target: is_last.then_some(&to.resolved),
+            resolve_target: part.is_last.then_some(&to.resolved),
             ops: Operations { load, store },
         })],
         depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
             view: &to.depth,
-            depth_ops: is_first.then_some(Operations { load: LoadOp::Clear(0.0), store }),
-            stencil_ops: Some(Operations { load: LoadOp::Clear(0), store: StoreOp::Discard }),
+            depth_ops: part.is_first.then_some(Operations { load: LoadOp::Clear(0.0), store }),
+            stencil_ops: Some(Operations { load: LoadOp::Clear(0), store: kept(part.keeps_stencil) }),
         }),
         ..Default::default()
     })

@@ -8,11 +8,12 @@ use crate::layouts::Layouts;
 use crate::lighting::Lighting;
 use crate::lights::Lights;
 use crate::maps::Maps;
-use crate::plan::{self, Purpose, ViewPlan};
+use crate::plan::{self, ViewPlan};
 use crate::read_back::{self, GreyPixels, RgbaPixels};
 use crate::record::{Drawer, Recorder};
 use crate::screen::Screen;
 use crate::slots::Slots;
+use crate::soft::{self, SoftJob, SoftPass};
 use crate::stats::{FrameStats, Problems};
 use crate::surface::{Pass, Surface};
 use crate::targets::{Target, ViewTargets};
@@ -29,6 +30,7 @@ pub struct Renderer {
     screen: Screen,
     maps: Maps,
     volumes: VolumePass,
+    soft: SoftPass,
     deformer: Deformer,
     meshes: Slab<Mesh, Option<GpuMesh>>,
     materials: Slab<Material, GpuMaterial>,
@@ -56,6 +58,7 @@ impl Renderer {
             screen: Screen::new(device, &layouts),
             maps: Maps::new(device, &layouts),
             volumes: VolumePass::new(device, gpu::DEPTH_FORMAT, gpu::SAMPLES, linear, &layouts.view),
+            soft: SoftPass::new(device, &layouts),
             deformer: Deformer::new(device),
             meshes: Slab::default(),
             materials: Slab::default(),
@@ -85,15 +88,17 @@ impl Renderer {
         self.take_drawables(scene);
         let lights = Lights::new(scene);
         self.choose_maps(scene, pictures);
-        let (jobs, purposes) = jobs::jobs(scene, &lights, &self.draws, &self.meshes, &self.deformer, &mut self.films);
-        let plans = self.plan_views(scene, pictures, &lights, &purposes, &mut stats);
+        let (mut jobs, purposes) = jobs::jobs(scene, &lights, &self.draws, &self.meshes, &self.deformer, &mut self.films);
+        let soft = soft::soft_jobs(scene, &lights, &purposes, &mut jobs);
+        let plans =
+            self.plan_views(pictures, &plan::Frame { scene, lights: &lights, purposes: &purposes, soft: &soft }, &mut stats);
         self.upload(scene, &lights);
         let prepared = Instant::now();
 
-        self.record(&plans, &jobs, &mut stats);
+        self.record(&plans, (&jobs, &soft), &mut stats);
         self.drop_unused();
         stats.maps = self.maps.faces.len() as u32;
-        stats.volume_jobs = jobs.len() as u32;
+        stats.volume_jobs = purposes.len() as u32;
         stats.prepare_s = (prepared - start).as_secs_f64();
         stats.encode_s = prepared.elapsed().as_secs_f64();
         Ok(stats)
@@ -152,17 +157,9 @@ impl Renderer {
         self.maps.prepare(&self.gpu.device, &mut self.views, &mut self.draws);
     }
 
-    fn plan_views(
-        &mut self,
-        scene: &Scene,
-        pictures: &[Picture],
-        lights: &Lights,
-        purposes: &[Purpose],
-        stats: &mut FrameStats,
-    ) -> Vec<ViewPlan> {
+    fn plan_views(&mut self, pictures: &[Picture], frame: &plan::Frame<'_>, stats: &mut FrameStats) -> Vec<ViewPlan> {
         let device = &self.gpu.device;
         let limit = device.limits().max_texture_dimension_2d;
-        let frame = plan::Frame { scene, lights, purposes };
         let mut plans = Vec::new();
         self.targets.resize_with(pictures.len(), || None);
         for (number, picture) in pictures.iter().enumerate() {
@@ -174,13 +171,15 @@ impl Renderer {
                 self.targets[number] = Some(Target::new(device, &self.layouts.picture, picture));
             }
             let (draws, views, problems) = (&mut self.draws, &mut self.views, &mut self.problems);
-            plans.extend(plan::plan_picture(number, picture, &frame, draws, views, problems, stats, limit));
+            plans.extend(plan::plan_picture(number, picture, frame, draws, views, problems, stats, limit));
         }
         for view in &plans {
-            self.view_targets.make(device, &self.layouts.picture, view.size, self.frame);
+            let is_soft = view.steps.iter().any(|s| s.soft.is_some());
+            self.view_targets.make(device, &self.layouts.picture, view.size, is_soft, self.frame);
             let mut passes = vec![(view.base_pass(), &view.opaque), (Pass::Blend, &view.blended)];
             if !view.steps.is_empty() {
-                passes.extend([(view.add_pass(), &view.opaque), (Pass::Exempt, &view.exempt)]);
+                passes.push((Pass::Exempt, &view.exempt));
+                passes.extend(view.steps.iter().map(|s| (view.add_pass(s.soft.is_some()), &view.opaque)));
             }
             for (pass, list) in passes {
                 for draw in list {
@@ -201,11 +200,13 @@ impl Renderer {
     }
 
     /// Records and submits: deformation, volumes, maps, views.
-    fn record(&mut self, plans: &[ViewPlan], jobs: &[VolumeJob], stats: &mut FrameStats) {
+    fn record(&mut self, plans: &[ViewPlan], (jobs, soft): (&[VolumeJob], &[Option<SoftJob>]), stats: &mut FrameStats) {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         stats.deformed = self.deformer.run(&mut encoder, &self.clock);
         stats.volumes_made = self.volumes.prepare(device, &mut encoder, jobs);
+        let report = |message| self.problems.report(message);
+        self.soft.prepare((device, queue), &mut encoder, &mut self.volumes, (jobs, soft), report);
         let drawer = Drawer {
             meshes: &self.meshes,
             materials: &self.materials,
@@ -218,7 +219,9 @@ impl Renderer {
             drawer: &drawer,
             surface: &self.surface,
             screen: &self.screen,
+            device,
             volumes: &self.volumes,
+            soft: &self.soft,
             views: &self.views,
             films: &self.films,
             lighting: self.lighting.group(),

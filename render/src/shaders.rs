@@ -2,8 +2,19 @@
 
 /// Name and parts of every shader.
 #[cfg(test)]
-pub(crate) const ALL: &[(&str, &[&str])] =
-    &[("surface", SURFACE), ("background", BACKGROUND), ("film", FILM), ("compose", COMPOSE), ("maps", MAPS), ("deform", DEFORM)];
+pub(crate) const ALL: &[(&str, &[&str])] = &[
+    ("surface", SURFACE),
+    ("background", BACKGROUND),
+    ("film", FILM),
+    ("compose", COMPOSE),
+    ("maps", MAPS),
+    ("deform", DEFORM),
+    ("silhouettes", SILHOUETTES),
+    ("hard shadow", HARD_SHADOW),
+    ("wedges", WEDGES),
+    ("penumbra", PENUMBRA),
+    ("soft film", SOFT_FILM),
+];
 
 pub(crate) const SURFACE: &[&str] = &[
     include_str!("shaders/position.wgsl"),
@@ -13,6 +24,7 @@ pub(crate) const SURFACE: &[&str] = &[
     include_str!("shaders/light.wgsl"),
     include_str!("shaders/brdf.wgsl"),
     include_str!("shaders/shadow_map.wgsl"),
+    include_str!("shaders/soft_shadow.wgsl"),
     include_str!("surface.wgsl"),
 ];
 
@@ -38,6 +50,28 @@ pub(crate) const MAPS: &[&str] = &[
 
 pub(crate) const DEFORM: &[&str] = &[include_str!("deform.wgsl")];
 
+pub(crate) const SILHOUETTES: &[&str] =
+    &[include_str!("shaders/position.wgsl"), include_str!("volumes/caster.wgsl"), include_str!("soft/silhouettes.wgsl")];
+
+pub(crate) const HARD_SHADOW: &[&str] = &[include_str!("shaders/fullscreen.wgsl"), include_str!("soft/hard.wgsl")];
+
+pub(crate) const WEDGES: &[&str] =
+    &[include_str!("shaders/view.wgsl"), include_str!("soft/source.wgsl"), include_str!("soft/wedges.wgsl")];
+
+pub(crate) const PENUMBRA: &[&str] = &[
+    include_str!("shaders/view.wgsl"),
+    include_str!("soft/source.wgsl"),
+    include_str!("shaders/fullscreen.wgsl"),
+    include_str!("soft/penumbra.wgsl"),
+];
+
+pub(crate) const SOFT_FILM: &[&str] = &[
+    include_str!("shaders/soft_shadow.wgsl"),
+    include_str!("shaders/fullscreen.wgsl"),
+    include_str!("film.wgsl"),
+    include_str!("soft/film.wgsl"),
+];
+
 /// Compiles the joined parts.
 pub(crate) fn module(device: &wgpu::Device, name: &str, parts: &[&str]) -> wgpu::ShaderModule {
     device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -49,7 +83,7 @@ pub(crate) fn module(device: &wgpu::Device, name: &str, parts: &[&str]) -> wgpu:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{deform, uniforms};
+    use crate::{deform, soft, uniforms};
     use naga::valid::{Capabilities, ValidationFlags, Validator};
     use std::mem::offset_of;
 
@@ -91,6 +125,7 @@ mod tests {
             ours!("surface", "MapFace", uniforms::MapFace, map_from_world world_from_map tile light texel),
             ours!("surface", "Frame", uniforms::Frame, ambient zenith horizon nadir fog_color fog_range fog_kind light_count),
             ours!("film", "Film", uniforms::Film, color),
+            ours!("penumbra", "Source", soft::Source, toward_light size),
             ours!("deform", "Deformation", deform::Uniform, vertex_count target_count joint_count),
         ] {
             let (_, parts) = ALL.iter().find(|(n, _)| *n == shader).unwrap();

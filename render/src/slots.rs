@@ -39,13 +39,18 @@ impl<T: Pod> Slots<T> {
         }
         let slots = self.bytes.len() as u64 / STRIDE;
         for slot in self.groups.len() as u64..slots {
-            let binding = wgpu::BufferBinding {
-                buffer: &self.buffer.buffer,
-                offset: slot * STRIDE,
-                size: wgpu::BufferSize::new(size_of::<T>() as u64),
-            };
-            let entries = &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(binding) }];
+            let resource = wgpu::BindingResource::Buffer(self.binding(slot as usize));
+            let entries = &[wgpu::BindGroupEntry { binding: 0, resource }];
             self.groups.push(device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries }));
+        }
+    }
+
+    /// The uniform alone, for groups that hold more.
+    pub(crate) fn binding(&self, slot: usize) -> wgpu::BufferBinding<'_> {
+        wgpu::BufferBinding {
+            buffer: &self.buffer.buffer,
+            offset: slot as u64 * STRIDE,
+            size: wgpu::BufferSize::new(size_of::<T>() as u64),
         }
     }
 

@@ -16,10 +16,14 @@ pub(crate) enum Pass {
     Blend,
     /// One light where the stencil is 0.
     Add,
+    /// One light as far as its shadow texture shows it.
+    AddSoft,
     /// Depth, and what a map lets through of one light.
     Visibility,
     /// The same where the stencil is 0.
     VisibilityAdd,
+    /// What the shadow texture shows of one light.
+    VisibilitySoft,
     /// Sets the stencil to 0 where a shape shows that receives no shadows.
     Exempt,
 }
@@ -28,24 +32,30 @@ pub(crate) enum Pass {
 pub(crate) struct Surface {
     module: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
+    /// With the shadow texture beside the view.
+    soft_layout: wgpu::PipelineLayout,
     pipelines: HashMap<(Pass, Kind), wgpu::RenderPipeline>,
 }
 
 impl Surface {
     pub(crate) fn new(device: &wgpu::Device, layouts: &Layouts) -> Surface {
-        let groups = [&layouts.view, &layouts.instances, &layouts.material, &layouts.lighting].map(Some);
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("surface"),
-            bind_group_layouts: &groups,
-            immediate_size: 0,
-        });
+        let layout = |view| {
+            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("surface"),
+                bind_group_layouts: &[view, &layouts.instances, &layouts.material, &layouts.lighting].map(Some),
+                immediate_size: 0,
+            })
+        };
+        let (layout, soft_layout) = (layout(&layouts.view), layout(&layouts.soft_view));
         let module = shaders::module(device, "surface", shaders::SURFACE);
-        Surface { module, layout, pipelines: HashMap::new() }
+        Surface { module, layout, soft_layout, pipelines: HashMap::new() }
     }
 
     /// Makes the pipeline where there is none yet.
     pub(crate) fn make(&mut self, device: &wgpu::Device, pass: Pass, kind: Kind) {
-        let make = || pipeline(device, &self.module, &self.layout, pass, kind);
+        let is_soft = matches!(pass, Pass::AddSoft | Pass::VisibilitySoft);
+        let layout = if is_soft { &self.soft_layout } else { &self.layout };
+        let make = || pipeline(device, &self.module, layout, pass, kind);
         self.pipelines.entry((pass, kind)).or_insert_with(make);
     }
 
@@ -75,11 +85,13 @@ fn pipeline(
         (Pass::Base, _) => "opaque",
         (Pass::Blend, _) => "blended",
         (Pass::Add, _) => "added",
+        (Pass::AddSoft, _) => "added_soft",
+        (Pass::VisibilitySoft, _) => "visibility_soft",
         (Pass::Visibility | Pass::VisibilityAdd, _) => "visibility",
         (Pass::Exempt, _) => "nothing",
     };
     let fills_depth = matches!(pass, Pass::Base | Pass::Visibility);
-    let adds = matches!(pass, Pass::Add | Pass::VisibilityAdd);
+    let adds = matches!(pass, Pass::Add | Pass::VisibilityAdd | Pass::AddSoft | Pass::VisibilitySoft);
     let depth_compare = if adds || pass == Pass::Exempt { wgpu::CompareFunction::Equal } else { wgpu::CompareFunction::Greater };
     let sum = |dst_factor| wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,
@@ -89,13 +101,13 @@ fn pipeline(
     let blend = match pass {
         Pass::Base | Pass::Visibility | Pass::Exempt => None,
         Pass::Blend => Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-        Pass::Add | Pass::VisibilityAdd => {
+        Pass::Add | Pass::VisibilityAdd | Pass::AddSoft | Pass::VisibilitySoft => {
             Some(wgpu::BlendState { color: sum(wgpu::BlendFactor::One), alpha: sum(wgpu::BlendFactor::One) })
         }
     };
     let stencil = match pass {
         Pass::Exempt => without_shadow(),
-        _ if adds => outside_shadow(),
+        Pass::Add | Pass::VisibilityAdd => outside_shadow(),
         _ => wgpu::StencilState::default(),
     };
     let write_mask = if pass == Pass::Exempt { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };

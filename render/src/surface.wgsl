@@ -203,9 +203,8 @@ fn blended(f: Fragment) -> @location(0) vec4<f32> {
     return vec4<f32>(base(f, s) * alpha, alpha);
 }
 
-// The view's lights alone, to be added to what is there.
-@fragment
-fn added(f: Fragment) -> @location(0) vec4<f32> {
+// The view's lights alone.
+fn lights_alone(f: Fragment) -> vec4<f32> {
     let s = place(f);
     if s.is_unlit || (material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff) {
         discard;
@@ -213,9 +212,14 @@ fn added(f: Fragment) -> @location(0) vec4<f32> {
     return vec4<f32>(reflected(f, s) * (1.0 - fog_share(s.distance)), 0.0);
 }
 
-// Share of one light that a map lets through. Cone, distance and orientation do not count.
+// To be added to what is there.
 @fragment
-fn visibility(f: Fragment) -> @location(0) vec4<f32> {
+fn added(f: Fragment) -> @location(0) vec4<f32> {
+    return lights_alone(f);
+}
+
+// Share of one light that a map lets through. Cone, distance and orientation do not count.
+fn share_through_map(f: Fragment) -> vec4<f32> {
     let s = place(f);
     if material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff {
         discard;
@@ -230,6 +234,31 @@ fn visibility(f: Fragment) -> @location(0) vec4<f32> {
         lit = map_visibility(light, f.p_in_world, s.face_normal);
     }
     return vec4<f32>(vec3<f32>(lit), 1.0);
+}
+
+@fragment
+fn visibility(f: Fragment) -> @location(0) vec4<f32> {
+    return share_through_map(f);
+}
+
+// Share of the view's one light that its shadow texture shows.
+fn shown_share(f: Fragment) -> f32 {
+    let hidden = hidden_share(f.clip.xy, f.clip.z, vec2<f32>(dpdx(f.clip.z), dpdy(f.clip.z)));
+    return select(1.0, 1.0 - hidden, (f.flags & RECEIVES_SHADOW) != 0u);
+}
+
+// The view's one light, to be added to what is there, as far as its shadow texture shows it.
+@fragment
+fn added_soft(f: Fragment) -> @location(0) vec4<f32> {
+    let shown = 1.0 - lights[view.first_light].shadow_intensity * (1.0 - shown_share(f));
+    return lights_alone(f) * shown;
+}
+
+// The share alone.
+@fragment
+fn visibility_soft(f: Fragment) -> @location(0) vec4<f32> {
+    let shown = shown_share(f);
+    return share_through_map(f) * shown;
 }
 
 // For what it does to the stencil.

@@ -1,6 +1,7 @@
 //! Textures that pictures are made in.
 
 use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT, SAMPLES};
+use crate::soft::SoftTarget;
 use std::collections::HashMap;
 use umbriel_scene::{Layout, Picture};
 
@@ -85,6 +86,8 @@ pub(crate) struct ViewTarget {
     pub(crate) samples: wgpu::TextureView,
     pub(crate) resolved: wgpu::TextureView,
     pub(crate) depth: wgpu::TextureView,
+    /// Made when the first soft shadow needs it.
+    pub(crate) soft: Option<SoftTarget>,
     /// Group 1 of the pass that reads `resolved`.
     pub(crate) group: wgpu::BindGroup,
     last_used: u64,
@@ -95,7 +98,14 @@ pub(crate) struct ViewTarget {
 pub(crate) struct ViewTargets(HashMap<[u32; 2], ViewTarget>);
 
 impl ViewTargets {
-    pub(crate) fn make(&mut self, device: &wgpu::Device, picture_layout: &wgpu::BindGroupLayout, size: [u32; 2], frame: u64) {
+    pub(crate) fn make(
+        &mut self,
+        device: &wgpu::Device,
+        picture_layout: &wgpu::BindGroupLayout,
+        size: [u32; 2],
+        is_soft: bool,
+        frame: u64,
+    ) {
         let target = self.0.entry(size).or_insert_with(|| {
             let view = |label, format, sample_count, usage| {
                 let texture = device.create_texture(&wgpu::TextureDescriptor {
@@ -116,11 +126,15 @@ impl ViewTargets {
                 samples: view("samples", LINEAR_FORMAT, SAMPLES, none),
                 group: picture_group(device, picture_layout, &resolved),
                 resolved,
-                depth: view("depth", DEPTH_FORMAT, SAMPLES, none),
+                depth: view("depth", DEPTH_FORMAT, SAMPLES, wgpu::TextureUsages::TEXTURE_BINDING),
+                soft: None,
                 last_used: frame,
             }
         });
         target.last_used = frame;
+        if is_soft && target.soft.is_none() {
+            target.soft = Some(SoftTarget::new(device, target.depth.texture()));
+        }
     }
 
     pub(crate) fn get(&self, size: [u32; 2]) -> Option<&ViewTarget> {

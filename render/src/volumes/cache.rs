@@ -7,17 +7,17 @@ use umbriel_scene::Mesh;
 use wgpu::util::DeviceExt;
 
 /// A [`Part`] on the GPU.
-pub(super) struct GpuPart {
-    pub(super) triangle_count: u32,
-    pub(super) edge_count: u32,
+pub(crate) struct GpuPart {
+    pub(crate) triangle_count: u32,
+    pub(crate) edge_count: u32,
     pub(super) layers: u32,
     /// Are there surfaces that cast as they are wound, and such that cast turned over, before a matrix mirrors them?
     pub(super) windings: [bool; 2],
     /// Most triangles at one edge.
     pub(super) widest_edge: u32,
-    pub(super) triangles: wgpu::Buffer,
-    pub(super) edges: wgpu::Buffer,
-    pub(super) incidences: wgpu::Buffer,
+    pub(crate) triangles: wgpu::Buffer,
+    pub(crate) edges: wgpu::Buffer,
+    pub(crate) incidences: wgpu::Buffer,
     /// Edge of each incidence.
     pub(super) edge_of: wgpu::Buffer,
 }

@@ -28,7 +28,7 @@ const WIDEST_EDGE: u32 = 32;
 /// `Caster` of the shaders.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub(super) struct CasterUniform {
+pub(crate) struct CasterUniform {
     world_from_object: Mat4,
     toward_light: Vec4,
     triangle_count: u32,
@@ -39,7 +39,7 @@ pub(super) struct CasterUniform {
 
 impl CasterUniform {
     /// Thrown to infinity.
-    fn new(light: &VolumeLight, world_from_object: Mat4, bounds: &Aabb, part: &GpuPart) -> CasterUniform {
+    pub(crate) fn new(light: &VolumeLight, world_from_object: Mat4, bounds: &Aabb, part: &GpuPart) -> CasterUniform {
         // Of a closed surface the near side is enough only while the light is outside of it.
         let (p, margin) = (light.toward_light.truncate(), 1e-3 * bounds.radius());
         let outside = p.cmplt(bounds.min - margin).any() || p.cmpgt(bounds.max + margin).any();

@@ -25,7 +25,9 @@ mod hull;
 mod parts;
 mod reach;
 
+pub(crate) use cache::GpuPart;
 pub use choose::Sight;
+pub(crate) use extract::CasterUniform;
 
 use choose::Watch;
 use extract::{Lists, Stale, Wanted};
@@ -216,6 +218,11 @@ impl VolumePass {
         self.extract.run(device, encoder, &stale);
         self.meshes.forget_dead();
         stats
+    }
+
+    /// What of a mesh casts, part by part.
+    pub(crate) fn parts(&mut self, device: &wgpu::Device, mesh: &Arc<Mesh>) -> &[Arc<GpuPart>] {
+        self.meshes.parts(device, mesh)
     }
 
     /// Counts the volumes of a job into the stencil, which must be 0 in the viewport; afterwards it is 0 where the light

@@ -6,6 +6,7 @@ mod lights;
 mod outputs;
 mod shadows;
 mod shapes;
+mod soft;
 mod support;
 mod surfaces;
 mod town;
