@@ -50,8 +50,12 @@ pub(crate) const MAPS: &[&str] = &[
 
 pub(crate) const DEFORM: &[&str] = &[include_str!("deform.wgsl")];
 
-pub(crate) const SILHOUETTES: &[&str] =
-    &[include_str!("shaders/position.wgsl"), include_str!("volumes/caster.wgsl"), include_str!("soft/silhouettes.wgsl")];
+pub(crate) const SILHOUETTES: &[&str] = &[
+    include_str!("shaders/position.wgsl"),
+    include_str!("volumes/silhouette.wgsl"),
+    include_str!("volumes/caster.wgsl"),
+    include_str!("soft/silhouettes.wgsl"),
+];
 
 pub(crate) const HARD_SHADOW: &[&str] = &[include_str!("shaders/fullscreen.wgsl"), include_str!("soft/hard.wgsl")];
 
