@@ -39,18 +39,7 @@ impl Edges {
         if mesh.topology != Topology::Triangles {
             return Edges::default();
         }
-        let mut welded = weld_positions(&mesh.positions);
-        if mesh.joints.len() == mesh.positions.len() && mesh.weights.len() == mesh.joints.len() {
-            refine(&mut welded, |v| mesh.weights[v].to_array().map(bits));
-            // The joint of a weight of zero means nothing; exporters leave anything there.
-            refine(&mut welded, |v| {
-                std::array::from_fn(|i| if mesh.weights[v][i] == 0.0 { 0 } else { u32::from(mesh.joints[v][i]) })
-            });
-        }
-        for target in mesh.morph_targets.iter().filter(|t| t.positions.len() == mesh.positions.len()) {
-            refine(&mut welded, |v| position_key(target.positions[v]));
-        }
-        Edges::of_welded(&welded, &mesh.indices)
+        Edges::of_welded(&welded(mesh), &mesh.indices)
     }
 
     /// Edges of triangles whose vertices are the same where their positions are equal (-0.0 equals 0.0).
@@ -65,7 +54,7 @@ impl Edges {
     }
 
     /// `welded[v]` is the lowest vertex that is the same as `v`. Triangles with indices out of range are left out.
-    fn of_welded(welded: &[u32], indices: &[u32]) -> Edges {
+    pub(crate) fn of_welded(welded: &[u32], indices: &[u32]) -> Edges {
         let mut sides: Vec<(u64, u32)> = Vec::with_capacity(indices.len());
         for (triangle, corners) in (0u32..).zip(indices.chunks_exact(3)) {
             let [Some(&a), Some(&b), Some(&c)] = [0, 1, 2].map(|i| welded.get(corners[i] as usize)) else { continue };
@@ -88,6 +77,25 @@ impl Edges {
             closed &= count == 2 && (group[0].1 ^ group[1].1) & 1 == 1;
         }
         Edges { edges, incidences: sides.into_iter().map(|(_, incidence)| incidence).collect(), closed }
+    }
+}
+
+/// The lowest vertex that is the same as each: at one place, and moving together where the mesh deforms.
+pub(crate) fn welded(mesh: &Mesh) -> Vec<u32> {
+    let mut welded = weld_positions(&mesh.positions);
+    part_by_motion(&mut welded, mesh);
+    welded
+}
+
+/// Splits classes of vertices by what moves them; afterwards each class is named by its lowest vertex.
+pub(crate) fn part_by_motion(welded: &mut [u32], mesh: &Mesh) {
+    if mesh.joints.len() == mesh.positions.len() && mesh.weights.len() == mesh.joints.len() {
+        refine(welded, |v| mesh.weights[v].to_array().map(bits));
+        // The joint of a weight of zero means nothing; exporters leave anything there.
+        refine(welded, |v| std::array::from_fn(|i| if mesh.weights[v][i] == 0.0 { 0 } else { u32::from(mesh.joints[v][i]) }));
+    }
+    for target in mesh.morph_targets.iter().filter(|t| t.positions.len() == mesh.positions.len()) {
+        refine(welded, |v| position_key(target.positions[v]));
     }
 }
 

@@ -11,6 +11,7 @@
 mod adjacency;
 mod bounds;
 mod deform;
+pub mod doctor;
 mod light;
 mod material;
 mod mesh;
