@@ -13,10 +13,10 @@ pub(crate) struct Accessors<'a> {
 }
 
 /// The elements of an accessor without gaps.
-struct Packed {
-    bytes: Vec<u8>,
-    kind: DataType,
-    normalized: bool,
+pub(crate) struct Packed {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) kind: DataType,
+    pub(crate) normalized: bool,
 }
 
 impl<'a> Accessors<'a> {
@@ -75,7 +75,8 @@ impl<'a> Accessors<'a> {
         Ok(packed.bytes.chunks_exact(size * N).map(element).collect())
     }
 
-    fn packed(&self, accessor: &Accessor<'_>) -> Result<Packed, Fault> {
+    /// The elements as they are stored, sparse ones put in.
+    pub(crate) fn packed(&self, accessor: &Accessor<'_>) -> Result<Packed, Fault> {
         let (object, size, count) = (name_of(accessor), accessor.size(), accessor.count());
         let total = (count as u64).saturating_mul(size as u64);
         let mut bytes = match accessor.view() {

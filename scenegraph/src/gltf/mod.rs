@@ -11,6 +11,8 @@
 //! Nothing is re-triangulated, welded or reordered. Animations become a `TimeSensor` and interpolators with routes;
 //! they are named `<model>/<animation>` and lie below the model's root, the first one enabled.
 //!
+//! [`Objects`] are the primitives of a file as plain meshes, and the file again with some of them mended.
+//!
 //! This module knows nothing of drawing. It reads no file outside of the asset root, and nothing from the network.
 
 mod accessor;
@@ -23,15 +25,18 @@ mod check;
 mod container;
 mod content;
 mod error;
+mod objects;
 mod read;
 mod surface;
 mod topology;
 mod tracks;
 mod uri;
+mod write;
 
 use content::Content;
 use error::Fault;
 pub use error::{Cause, Error};
+pub use objects::{Object, Objects};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use umbriel_fields::{Graph, NodeId};

@@ -12,6 +12,7 @@ mod apply;
 mod cap;
 mod drop;
 mod examine;
+mod faults;
 mod findings;
 mod junctions;
 mod orient;
@@ -23,6 +24,7 @@ mod tests;
 mod turn;
 
 pub use examine::examine;
+pub use faults::{FaultyEdges, faulty_edges};
 pub use findings::Findings;
 
 use crate::{Mesh, Topology};
