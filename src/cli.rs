@@ -34,6 +34,14 @@ pub(crate) enum Command {
     Replay(Replay),
     /// Tells from a recording why a field holds what it holds
     Explain(Explain),
+    /// Examines the meshes of a model or a world, and mends those of a model
+    ///
+    /// Reports for each mesh whether its triangles are closed, two-manifold and consistently oriented, and what stands in the
+    /// way. Nothing is changed unless a step is asked for, and nothing is written without --out. Surfaces that cut through
+    /// themselves are not looked for.
+    ///
+    /// Exit status: 0 every mesh is sound (after mending, if any is asked for), 2 some are not, 1 it cannot be read or written.
+    Doctor(Doctor),
     /// Prints the reference of node types
     Nodes(Nodes),
 }
@@ -151,6 +159,39 @@ pub(crate) struct ShadowError {
 }
 
 #[derive(Args, Debug)]
+pub(crate) struct Doctor {
+    /// A model (.gltf, .glb), or a world (.rhai), which is examined only
+    pub(crate) path: PathBuf,
+    /// Move vertices that are at most so far apart to one place; without a number, a millionth of the mesh's size
+    #[arg(long, value_name = "METRES", num_args = 0..=1, require_equals = true, value_parser = distance)]
+    pub(crate) weld: Option<Option<f32>>,
+    /// Leave out triangles without area, and copies of triangles
+    #[arg(long)]
+    pub(crate) drop: bool,
+    /// Split triangles of open edges at corners that lie on them (T-junctions)
+    #[arg(long)]
+    pub(crate) stitch: bool,
+    /// Part surfaces at edges of more than two triangles, and where they only touch
+    #[arg(long)]
+    pub(crate) split: bool,
+    /// Turn triangles so that neighbours wind alike, and closed surfaces outward
+    #[arg(long)]
+    pub(crate) orient: bool,
+    /// Close holes
+    #[arg(long)]
+    pub(crate) cap: bool,
+    /// Every step
+    #[arg(long)]
+    pub(crate) all: bool,
+    /// Write the mended model to this .glb
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// Draw before and after side by side to this .png
+    #[arg(long)]
+    pub(crate) picture: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
 pub(crate) struct Nodes {
     /// One type; otherwise all of them, a line each
     pub(crate) name: Option<String>,
@@ -178,6 +219,13 @@ fn size(text: &str) -> Result<[u32; 2], String> {
         Some(size) if size.iter().any(|s| *s > 16384) => Err("a side may have at most 16384 pixels".to_string()),
         Some(size) => Ok(size),
         None => Err("expected WIDTHxHEIGHT, such as 1280x720".to_string()),
+    }
+}
+
+fn distance(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(metres) if metres.is_finite() && metres >= 0.0 => Ok(metres),
+        _ => Err("expected a distance in metres, 0 or more".to_string()),
     }
 }
 

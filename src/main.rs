@@ -1,6 +1,7 @@
 //! The `umbriel` command: shows worlds written in rhai and models, in windows or in files, and scores their shadows.
 
 mod cli;
+mod doctor;
 mod headless;
 mod model;
 mod nodes;
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Command::ShadowError(args) => shadow_error::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Explain(args) => replay::explain(args).map(|text| print(&text)),
+        Command::Doctor(args) => doctor::run(args),
         Command::Nodes(cli::Nodes { definitions: Some(folder), .. }) => {
             nodes::write_definitions(folder).map(|text| print(&text)).map_err(|e| format!("{}: {e}", folder.display()).into())
         }

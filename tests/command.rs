@@ -184,3 +184,40 @@ fn frames_are_numbered_and_follow_the_clock() {
     let steps = [places[1] - places[0], places[2] - places[1]];
     assert!(steps.iter().all(|s| *s > 5.0) && (steps[0] - steps[1]).abs() < 2.0, "{places:?}");
 }
+
+#[test]
+fn the_doctor_reports_mends_and_says_what_is_wrong() {
+    let model = root().join("scripts/worlds/models/ferry.glb");
+    let (model, folder) = (model.to_str().expect("paths are text"), folder("doctor"));
+    let (mended, picture) = (folder.join("ferry.glb"), folder.join("ferry.png"));
+    let [mended, picture] = [&mended, &picture].map(|p| p.to_str().expect("paths are text"));
+    let report = umbriel(&["doctor", model]);
+    assert!(!report.ok && report.stdout.contains("meshes=6 sound=2"), "{}{}", report.stdout, report.stderr);
+    let run = umbriel(&["doctor", model, "--all", "--out", mended, "--picture", picture]);
+    assert!(run.ok && run.stdout.contains("mended: meshes=6 sound=6"), "{}{}", run.stdout, run.stderr);
+    let again = umbriel(&["doctor", mended]);
+    assert!(again.ok && again.stdout.contains("meshes=6 sound=6"), "{}{}", again.stdout, again.stderr);
+    let picture = image::open(picture).expect("a picture was drawn").to_rgb8();
+    let red = |from: u32| {
+        let half = picture.enumerate_pixels().filter(|(x, _, p)| x / 640 == from && p[0] > 200 && p[1] < 100 && p[2] < 100);
+        half.count()
+    };
+    assert!(red(0) > 100 && red(1) == 0, "open edges before {}, after {}", red(0), red(1));
+
+    let world = root().join("scripts/worlds/hello.rhai");
+    let world = world.to_str().expect("paths are text");
+    let rows: [(&[&str], &str); 6] = [
+        (&["doctor", "nowhere.glb"], "nowhere.glb: cannot be read"),
+        (&["doctor", model, "--all", "--out", "/nowhere/a.glb"], "/nowhere/a.glb"),
+        (&["doctor", model, "--all", "--out", "a.obj"], ".glb"),
+        (&["doctor", model, "--weld=-1"], "0 or more"),
+        (&["doctor", world, "--all", "--out", mended], "mend the models that it loads"),
+        (&["doctor", "a.txt"], "a.txt"),
+    ];
+    for (args, expected) in rows {
+        let run = umbriel(args);
+        assert!(!run.ok && run.stderr.contains(expected), "{args:?}: {}", run.stderr);
+    }
+    let run = umbriel(&["doctor", world]);
+    assert!(run.stdout.contains("meshes="), "{}{}", run.stdout, run.stderr);
+}

@@ -165,7 +165,10 @@ impl File {
                 "NORMAL" if has_more || !mended.turned.is_empty() => self.floats(bytemuck::cast_slice(&mesh.normals), 3),
                 "TANGENT" if has_more || !mended.turned.is_empty() => self.floats(bytemuck::cast_slice(&mesh.tangents), 4),
                 "POSITION" | "NORMAL" | "TANGENT" => continue,
-                _ if has_more => self.grown(accessors, accessor(all, index)?, &mended.added)?,
+                _ if has_more => {
+                    let moves = name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_");
+                    self.grown(accessors, accessor(all, index)?, &mended.added, moves)?
+                }
                 _ => continue,
             };
             out[name] = new.into();
@@ -178,7 +181,7 @@ impl File {
         let mut out = old.clone();
         if !mended.added.is_empty() {
             for (name, index) in old.as_object().into_iter().flatten() {
-                out[name] = self.grown(accessors, accessor(all, index)?, &mended.added)?.into();
+                out[name] = self.grown(accessors, accessor(all, index)?, &mended.added, true)?.into();
             }
         }
         Ok(out)
@@ -196,16 +199,18 @@ impl File {
         self.accessor(bytemuck::cast_slice(values), 4 * lanes, VERTICES, entry)
     }
 
-    /// An attribute with elements for the added vertices: floats between those of their neighbours, other numbers like the
-    /// nearer one.
-    fn grown(&mut self, accessors: &Accessors<'_>, old: &Accessor<'_>, added: &[Added]) -> Result<usize, Fault> {
+    /// An attribute with elements for the added vertices: what `moves` is that of the vertex that they move like; of looks,
+    /// floats lie between those of their neighbours, other numbers are like those of the nearer one.
+    fn grown(&mut self, accessors: &Accessors<'_>, old: &Accessor<'_>, added: &[Added], moves: bool) -> Result<usize, Fault> {
         let packed = accessors.packed(old)?;
         let lanes = old.dimensions().multiplicity();
         let size = packed.kind.size() * lanes;
         let mut bytes = packed.bytes;
         for a in added {
             let at = |v: u32| v as usize * size..(v as usize + 1) * size;
-            let element = if packed.kind == DataType::F32 {
+            let element = if moves {
+                bytes[at(a.moves_like)].to_vec()
+            } else if packed.kind == DataType::F32 {
                 let lane = |v: u32, i: usize| f32::from_le_bytes(std::array::from_fn(|b| bytes[at(v).start + 4 * i + b]));
                 let mix = |i: usize| lane(a.from, i) + (lane(a.to, i) - lane(a.from, i)) * a.share;
                 (0..lanes).flat_map(|i| mix(i).to_le_bytes()).collect::<Vec<u8>>()

@@ -33,7 +33,7 @@ pub(crate) fn json_of(file: &Path) -> Value {
     serde_json::from_slice(&bytes[20..20 + length]).unwrap()
 }
 
-fn files_below(folder: &Path, out: &mut Vec<PathBuf>) {
+pub(crate) fn files_below(folder: &Path, out: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap().flatten() {
         let path = entry.path();
         if path.is_dir() {

@@ -18,22 +18,21 @@ pub(super) fn finish(mut soup: Soup, mesh: &Mesh, steps: &Steps, done: Done) -> 
     let place = |v: usize| soup.places[soup.corner_of[v] as usize];
     let moved = (0..soup.originals).filter(|v| mesh.positions[*v].is_finite()).filter(is_moved);
     let moved = moved.map(|v| (v as u32, place(v))).collect();
+    // All vertices of a corner must move together, or it would come apart.
+    let mut movers: Vec<Option<u32>> = vec![None; soup.places.len()];
+    for (v, corner) in soup.corner_of.iter().enumerate() {
+        movers[*corner as usize].get_or_insert_with(|| soup.original(v as u32));
+    }
     let added = soup.extras.iter().enumerate().map(|(i, e)| Added {
         from: e.from,
         to: e.to,
         share: e.share,
+        moves_like: movers[soup.corner_of[soup.originals + i] as usize].unwrap_or(e.from),
         position: place(soup.originals + i),
         normal: e.normal,
     });
     let added = added.collect();
     Mended { indices: soup.triangles.into_flattened(), moved, turned, added, done, ..Mended::default() }
-}
-
-impl Mended {
-    /// Is the mesh as it was?
-    pub fn is_unchanged(&self) -> bool {
-        self.done.is_nothing() && self.moved.is_empty() && self.added.is_empty()
-    }
 }
 
 /// The mesh as it is when mended. What was not changed is shared with the old one.
@@ -61,11 +60,10 @@ pub(super) fn applied(mesh: &Mesh, mended: &Mended) -> Mesh {
         mended.turned.iter().for_each(|v| list[*v as usize].w *= -1.0);
         tangents = list.into();
     }
-    let offset = |x: Vec3, y: Vec3, share: f32| x.lerp(y, share);
     let target = |t: &MorphTarget| MorphTarget {
-        positions: grown(&t.positions, add, offset),
-        normals: grown(&t.normals, add, offset),
-        tangents: grown(&t.tangents, add, offset),
+        positions: moving(&t.positions, add),
+        normals: moving(&t.normals, add),
+        tangents: moving(&t.tangents, add),
     };
     Mesh {
         name: mesh.name.clone(),
@@ -75,9 +73,8 @@ pub(super) fn applied(mesh: &Mesh, mended: &Mended) -> Mesh {
         uv0: grown(&mesh.uv0, add, |x, y, share| x.lerp(y, share)),
         uv1: grown(&mesh.uv1, add, |x, y, share| x.lerp(y, share)),
         colors: grown(&mesh.colors, add, |x: Vec4, y, share| x.lerp(y, share)),
-        // Joints have no middle.
-        joints: grown(&mesh.joints, add, |x: [u16; 4], y, share| if share > 0.5 { y } else { x }),
-        weights: grown(&mesh.weights, add, |x: Vec4, y, share| if share > 0.5 { y } else { x }),
+        joints: moving(&mesh.joints, add),
+        weights: moving(&mesh.weights, add),
         morph_targets: mesh.morph_targets.iter().map(target).collect(),
         indices: mended.indices.clone().into(),
         bounds: Aabb::from_points(positions.iter().copied()),
@@ -94,7 +91,20 @@ fn grown<T: Copy>(values: &Arc<[T]>, added: &[Added], mix: impl Fn(T, T, f32) ->
     values.iter().copied().chain(more).collect()
 }
 
+/// What moves the added vertices.
+fn moving<T: Copy>(values: &Arc<[T]>, added: &[Added]) -> Arc<[T]> {
+    if added.is_empty() || values.is_empty() {
+        return values.clone();
+    }
+    values.iter().copied().chain(added.iter().map(|a| values[a.moves_like as usize])).collect()
+}
+
 impl Mended {
+    /// Is the mesh as it was?
+    pub fn is_unchanged(&self) -> bool {
+        self.done.is_nothing() && self.moved.is_empty() && self.added.is_empty()
+    }
+
     /// The mesh as it is when mended. What was not changed is shared with the old one.
     pub fn apply(&self, mesh: &Mesh) -> Mesh {
         applied(mesh, self)

@@ -42,7 +42,7 @@ pub struct Steps {
     pub stitch: bool,
     /// Parts surfaces that meet at edges of more than two triangles, or at single corners, by a millionth of their size.
     pub split: bool,
-    /// Turns triangles so that neighbours wind alike, and closed surfaces outward.
+    /// Turns triangles so that neighbours wind alike, and closed surfaces outward; open ones keep their side.
     pub orient: bool,
     /// Closes holes with triangles of their own.
     pub cap: bool,
@@ -74,6 +74,8 @@ pub struct Added {
     pub to: u32,
     /// Share of `to`, 0..=1.
     pub share: f32,
+    /// The vertex whose joints, weights and morph offsets it has: one that stands at its place, if there is any.
+    pub moves_like: u32,
     /// Its place, metres.
     pub position: Vec3,
     /// Its unit normal, where it is not that of `from` and `to`.
@@ -161,7 +163,7 @@ pub fn mend(mesh: &Mesh, steps: &Steps) -> Mended {
         done.split += split::corners(&mut soup);
     }
     if steps.orient {
-        orient::turn(&mut soup);
+        orient::turn(&mut soup, true);
     }
     // A cap may meet an edge that is there already, so that surfaces have to be parted again, which may open others.
     for _ in 0..4 {
@@ -173,7 +175,7 @@ pub fn mend(mesh: &Mesh, steps: &Steps) -> Mended {
         }
     }
     if steps.orient && done.capped > 0 {
-        orient::turn(&mut soup);
+        orient::turn(&mut soup, false);
     }
     done.turned = soup.turned.iter().filter(|t| **t).count();
     let mut mended = apply::finish(soup, mesh, steps, done);

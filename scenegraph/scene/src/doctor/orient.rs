@@ -15,8 +15,9 @@ struct Piece {
 }
 
 /// Turns triangles. Closed pieces face outward, but for one that lies within another and faced inward as a whole: that is
-/// the inside of a hollow body. Open pieces face the side that more of their area faced.
-pub(super) fn turn(soup: &mut Soup) {
+/// the inside of a hollow body. Open pieces face the side that more of their area faced; so do all where `outward` is false:
+/// whoever sees a roof from above must see it when the doctor has closed it below.
+pub(super) fn turn(soup: &mut Soup, outward: bool) {
     let edges = soup.edges();
     let pairs = Pairs::new(soup, &edges, Crowded::Open);
     let mut seen = vec![false; soup.triangles.len()];
@@ -32,7 +33,7 @@ pub(super) fn turn(soup: &mut Soup) {
             let signs = piece.against.iter().map(|a| if *a { -1.0 } else { 1.0 });
             piece.triangles.iter().zip(signs).map(|(t, sign)| sign * six_volumes(soup, *t as usize, boxes[number].0)).sum::<f64>()
         };
-        let all_against = if piece.closed && !piece.twisted {
+        let all_against = if outward && piece.closed && !piece.twisted {
             let volume = volume(piece);
             let was_alike = piece.against.iter().all(|a| !*a);
             let is_within = |other: &usize| {
