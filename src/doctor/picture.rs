@@ -8,9 +8,7 @@ use std::sync::Arc;
 use umbriel_displays::rig::fit_camera;
 use umbriel_render::{Gpu, Renderer, RgbaPixels};
 use umbriel_scene::doctor::faulty_edges;
-use umbriel_scene::{
-    Aabb, Drawable, Frustum, Light, LightKind, MapSettings, Material, Mesh, Picture, Scene, Shading, ShadowMethod, View,
-};
+use umbriel_scene::{Aabb, Drawable, Frustum, Light, Material, Mesh, Picture, Scene, Shading, ShadowMethod, View};
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -70,20 +68,8 @@ fn scene(meshes: &[(Mesh, Mat4)], width: f32, world_from_camera: Mat4) -> Scene 
 }
 
 fn light(world_from_camera: Mat4) -> Light {
-    Light {
-        name: "lamp".to_owned(),
-        kind: LightKind::Directional,
-        position: Vec3::ZERO,
-        direction: world_from_camera.transform_vector3(Vec3::new(0.4, -0.5, -1.0)).normalize(),
-        color: Vec3::ONE,
-        intensity: 2.2,
-        ambient_intensity: 0.0,
-        attenuation: Vec3::X,
-        range: f32::INFINITY,
-        shadows: ShadowMethod::None,
-        shadow_intensity: 1.0,
-        map: MapSettings::default(),
-    }
+    let direction = world_from_camera.transform_vector3(Vec3::new(0.4, -0.5, -1.0)).normalize();
+    Light { direction, intensity: 2.2, shadows: ShadowMethod::None, ..Light::default() }
 }
 
 fn material(color: Vec3, is_unlit: bool) -> Arc<Material> {

@@ -75,7 +75,7 @@ pub(super) fn paired(soup: &Soup, edges: &Edges, edge: &Edge) -> Vec<(u32, u32)>
     let step = |angle: f64| (angle * STEPS_PER_RAD).round() as i64 % (TAU * STEPS_PER_RAD).round() as i64;
     around.sort_by_key(|(angle, t, sign)| (step(*angle), -sign, *t));
     let count = around.len();
-    let starts = if count % 2 == 0 { 2 } else { count };
+    let starts = if count.is_multiple_of(2) { 2 } else { count };
     let pairs_from = |start: usize| {
         (0..count / 2).map(move |i| ((start + 2 * i) % count, (start + 2 * i + 1) % count)).collect::<Vec<(usize, usize)>>()
     };

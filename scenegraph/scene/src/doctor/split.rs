@@ -20,21 +20,22 @@ pub(super) fn corners(soup: &mut Soup) -> usize {
     made + (0..ROUNDS).map(|_| bend(soup)).take_while(|made| *made > 0).sum::<usize>()
 }
 
+/// The fans around a corner, and where each uses it: triangle, and place in it.
+type Fans = BTreeMap<u32, Vec<(usize, usize)>>;
+
 /// Gives every fan of triangles around a corner a corner of its own, moved a little into the surface's inside.
 fn part(soup: &mut Soup) -> usize {
     let edges = soup.edges();
     let pairs = Pairs::new(soup, &edges, Crowded::Paired);
     let mut union = fans(soup, &pairs);
-    // Of each corner its fans, of each fan the places in triangles.
-    let mut by_corner: HashMap<u32, BTreeMap<u32, Vec<(usize, usize)>>> = HashMap::new();
+    let mut by_corner: HashMap<u32, Fans> = HashMap::new();
     for t in 0..soup.triangles.len() {
         for (i, corner) in soup.corners(t).into_iter().enumerate() {
             let fan = union.root(3 * t as u32 + i as u32);
             by_corner.entry(corner).or_default().entry(fan).or_default().push((t, i));
         }
     }
-    let mut crowded: Vec<(u32, BTreeMap<u32, Vec<(usize, usize)>>)> =
-        by_corner.into_iter().filter(|(_, f)| f.len() > 1).collect();
+    let mut crowded: Vec<(u32, Fans)> = by_corner.into_iter().filter(|(_, f)| f.len() > 1).collect();
     crowded.sort_by_key(|(corner, _)| *corner);
     let mut made = 0;
     for (corner, fans) in crowded {
