@@ -51,6 +51,12 @@ impl ChangeLog {
         self.revision
     }
 
+    /// Takes over the revisions that a run of writes counted for itself.
+    #[inline]
+    pub(crate) fn catch_up(&mut self, revision: Revision) {
+        self.revision = revision;
+    }
+
     /// The revision of the last write, without making it a boundary.
     #[inline]
     pub(crate) fn last(&self) -> Revision {

@@ -5,8 +5,9 @@ use std::ops::Range;
 use crate::changes::{ChangeLog, Revision};
 use crate::column::{Column, Columns};
 use crate::kind::for_each_kind;
-use crate::program::{Group, Hop, Program, Programs, Run};
+use crate::program::{Group, Programs, Run};
 use crate::schedule::{ROUTED, Schedule};
+use crate::trail::Link;
 use crate::{FieldType, FieldValue, Kind};
 
 /// Shorter runs are copied one by one.
@@ -76,14 +77,14 @@ impl Copier<'_> {
 
     /// Follows a chain: the turn of a node with one copy, and then of its target, as long as that does nothing else and is next.
     #[inline]
-    fn hops<T: FieldValue>(&mut self, programs: &Programs, mut slot: u32, mut hop: Hop) -> usize {
-        let column = T::column_mut(self.columns);
-        let (schedule, changes) = (&mut *self.schedule, &mut *self.changes);
-        let (frame, lowest_waiting) = (schedule.frame, schedule.lowest_waiting());
+    fn hops<T: FieldValue>(&mut self, programs: &Programs, mut slot: u32) -> usize {
         let mut copied = 0;
-        loop {
+        while let Some(hop) = programs.hop(slot)
+            && hop.field_type == T::TYPE
+        {
+            let column = T::column_mut(self.columns);
             let (source, target) = (hop.source as usize, hop.target as usize);
-            let before = std::mem::replace(&mut schedule.turns[slot as usize].propagated, changes.last());
+            let before = std::mem::replace(&mut self.schedule.turns[slot as usize].propagated, self.changes.last());
             let written = column.revisions[source];
             if written <= before || column.revisions[target] >= written {
                 return copied;
@@ -92,28 +93,70 @@ impl Copier<'_> {
             if hop.compare && column.values[target].same(&value) {
                 return copied;
             }
-            let revision = changes.next();
-            column.values[target] = value;
+            let revision = self.changes.next();
             column.revisions[target] = revision;
-            changes.wrote(hop.node, revision);
-            copied += 1;
-            let next = match programs.get(hop.node) {
-                Program::Hop(next) if next.field_type == T::TYPE => *next,
-                _ => {
-                    schedule.mark(hop.node);
-                    return copied;
-                }
-            };
-            let at = hop.node as usize;
-            let turn = &mut schedule.turns[at];
-            // Only routes, and not waiting; a node without a rank fails the comparison.
-            if schedule.flags[at] != ROUTED || turn.frame == frame || turn.rank as usize >= lowest_waiting {
-                schedule.mark(hop.node);
+            column.values[target] = value.clone();
+            self.changes.wrote(hop.node, revision);
+            let links = programs.after(slot);
+            let followed = self.follow(hop.node, links, hop.compare, &value);
+            copied += 1 + followed;
+            if followed < links.len() {
                 return copied;
             }
-            turn.frame = frame;
-            (slot, hop) = (hop.node, next);
+            slot = links.last().map_or(hop.node, |link| link.node);
+            if !self.takes_turn(slot, programs.hop(slot).is_some_and(|hop| hop.field_type == T::TYPE)) {
+                return copied;
+            }
         }
+        copied
+    }
+
+    /// Has the turns of a node and of those behind it on its trail, each of which copies a value that is new to the node; ends where a node has
+    /// more to do or is not next, or where the target held the value. Gives how many links it wrote.
+    #[inline]
+    fn follow<T: FieldValue>(&mut self, mut node: u32, links: &[Link], compare: bool, value: &T) -> usize {
+        let column = T::column_mut(self.columns);
+        let (frame, lowest_waiting) = (self.schedule.frame, self.schedule.lowest_waiting());
+        let mut revision = self.changes.last();
+        let mut copied = 0;
+        for link in links {
+            let turn = &mut self.schedule.turns[node as usize];
+            // Only routes, and not waiting; a node without a rank fails the comparison.
+            let next =
+                self.schedule.flags[node as usize] == ROUTED && turn.frame != frame && (turn.rank as usize) < lowest_waiting;
+            if !next {
+                self.changes.catch_up(revision);
+                self.schedule.mark(node);
+                return copied;
+            }
+            (turn.frame, turn.propagated) = (frame, revision);
+            let target = &mut column.values[link.slot as usize];
+            if compare && target.same(value) {
+                break;
+            }
+            revision += 1;
+            *target = value.clone();
+            column.revisions[link.slot as usize] = revision;
+            self.changes.wrote(link.node, revision);
+            copied += 1;
+            node = link.node;
+        }
+        self.changes.catch_up(revision);
+        copied
+    }
+
+    /// Gives a node its turn at once, if it only has routes and is next, and the chain can go on; marks it otherwise.
+    #[inline]
+    fn takes_turn(&mut self, node: u32, goes_on: bool) -> bool {
+        let (frame, lowest_waiting) = (self.schedule.frame, self.schedule.lowest_waiting());
+        let turn = &mut self.schedule.turns[node as usize];
+        let next = self.schedule.flags[node as usize] == ROUTED && turn.frame != frame && (turn.rank as usize) < lowest_waiting;
+        if goes_on && next {
+            turn.frame = frame;
+        } else {
+            self.schedule.mark(node);
+        }
+        goes_on && next
     }
 }
 
@@ -139,11 +182,10 @@ macro_rules! by_type {
 
             /// Has the turn of a node that does nothing but one copy, and the turns of the chain that it starts; gives how many it wrote.
             #[inline]
-            pub(crate) fn chain(&mut self, programs: &Programs, slot: u32, hop: Hop) -> usize {
-                let FieldType { kind, multiple } = hop.field_type;
+            pub(crate) fn chain(&mut self, FieldType { kind, multiple }: FieldType, programs: &Programs, slot: u32) -> usize {
                 match (kind, multiple) { $(
-                    (Kind::$one, false) => self.hops::<$type>(programs, slot, hop),
-                    (Kind::$one, true) => self.hops::<std::sync::Arc<[$type]>>(programs, slot, hop),
+                    (Kind::$one, false) => self.hops::<$type>(programs, slot),
+                    (Kind::$one, true) => self.hops::<std::sync::Arc<[$type]>>(programs, slot),
                 )* }
             }
         }

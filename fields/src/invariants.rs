@@ -74,7 +74,8 @@ impl Graph {
         }
         for id in self.nodes.keys() {
             let program = self.programs.get(slot_of(id));
-            if *program != Program::Unmade && *program != self.compile(id) {
+            let hop = self.programs.hop(slot_of(id)).map(Program::Hop);
+            if *program != Program::Unmade && *hop.as_ref().unwrap_or(program) != self.compile(id) {
                 return Err(format!("the copy list of {} is out of date", self.describe(id)));
             }
         }

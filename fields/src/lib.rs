@@ -45,6 +45,7 @@ pub mod replica;
 mod route;
 pub mod save;
 mod schedule;
+mod trail;
 mod turn;
 mod value;
 mod why;

@@ -1,6 +1,8 @@
 //! Copy lists: what a node's routes come down to, made when the node has its turn and thrown away when its routes change.
 
 use crate::graph::slot_of;
+use crate::schedule::{DIRTY, ROUTED};
+use crate::trail::{LONGEST, Link, Trail, Trails};
 use crate::{FieldType, Graph, NodeId, RouteId, SetRule, Strength};
 
 /// Copies into fields of the source's type, to each of which no other route goes. Targets that lie beside each other, and belong to nodes that
@@ -52,6 +54,8 @@ pub(crate) enum Program {
     Unmade,
     /// One copy.
     Hop(Hop),
+    /// One copy that is part of a trail.
+    Link { trail: u32, place: u32 },
     /// The groups in the order of the node's fields, all of them direct.
     Direct(Box<Vec<Group>>),
     /// The same, with routes that need more than a copy.
@@ -62,6 +66,7 @@ pub(crate) enum Program {
 #[derive(Debug, Default)]
 pub(crate) struct Programs {
     made: Vec<Program>,
+    trails: Trails,
 }
 
 impl Programs {
@@ -71,8 +76,13 @@ impl Programs {
         }
     }
 
+    /// Throws a program away, with the trail that it is part of.
     pub(crate) fn forget(&mut self, slot: u32) {
-        self.made[slot as usize] = Program::Unmade;
+        if let Program::Link { trail, .. } = std::mem::take(&mut self.made[slot as usize]) {
+            for link in self.trails.remove(trail).sources() {
+                self.made[link.node as usize] = Program::Unmade;
+            }
+        }
     }
 
     /// Takes a program out, for the time in which it runs.
@@ -90,9 +100,79 @@ impl Programs {
     pub(crate) fn get(&self, slot: u32) -> &Program {
         &self.made[slot as usize]
     }
+
+    /// The only copy of a node that does nothing else.
+    #[inline]
+    pub(crate) fn hop(&self, slot: u32) -> Option<Hop> {
+        match self.made[slot as usize] {
+            Program::Hop(hop) => Some(hop),
+            Program::Link { trail, place } => Some(self.trails.get(trail).hop(place)),
+            _ => None,
+        }
+    }
+
+    /// What flows along a trail.
+    #[inline]
+    pub(crate) fn trail_type(&self, trail: u32) -> FieldType {
+        self.trails.get(trail).field_type
+    }
+
+    /// The targets that follow that of a node, as far as they are in one trail with it.
+    #[inline]
+    pub(crate) fn after(&self, slot: u32) -> &[Link] {
+        match self.made[slot as usize] {
+            Program::Link { trail, place } => self.trails.get(trail).after(place),
+            _ => &[],
+        }
+    }
+
+    /// Makes a trail of links, which belongs to all of them but the last.
+    fn lay(&mut self, trail: Trail) -> Program {
+        let at = self.trails.insert(trail);
+        for (place, link) in self.trails.get(at).sources().iter().enumerate() {
+            self.made[link.node as usize] = Program::Link { trail: at, place: place as u32 };
+        }
+        Program::Link { trail: at, place: 0 }
+    }
 }
 
 impl Graph {
+    /// Makes the program of a node that has none, and a trail of the chain that starts there.
+    pub(crate) fn make_program(&mut self, slot: u32) -> Program {
+        let program = self.compile(self.ids[slot as usize]);
+        let Program::Hop(hop) = program else { return program };
+        let mut trail = Trail::new(slot, hop);
+        while let Some(next) = self.next_on_trail(&trail) {
+            match *self.programs.get(trail.end().node) {
+                // What follows is short: the two become one.
+                Program::Link { trail: follows, .. } => trail.join(self.programs.trails.remove(follows)),
+                _ => trail.push(next),
+            }
+        }
+        if trail.sources().len() > 1 { self.programs.lay(trail) } else { program }
+    }
+
+    /// The hop from the end of a trail, if it can be part of it.
+    fn next_on_trail(&self, trail: &Trail) -> Option<Hop> {
+        let end = trail.end().node;
+        let room = LONGEST.checked_sub(trail.sources().len())?;
+        let next = match *self.programs.get(end) {
+            Program::Hop(hop) => hop,
+            Program::Link { trail, place: 0 } if self.programs.trails.get(trail).sources().len() <= room => {
+                self.programs.hop(end)?
+            }
+            // Only what does nothing but to pass values on is looked at ahead of its turn.
+            Program::Unmade if room > 0 && self.schedule.flags[end as usize] & !DIRTY == ROUTED => {
+                match self.compile(self.ids[end as usize]) {
+                    Program::Hop(hop) => hop,
+                    _ => return None,
+                }
+            }
+            _ => return None,
+        };
+        (room > 0 && trail.continues_with(next)).then_some(next)
+    }
+
     /// The program of a node's routes.
     pub(crate) fn compile(&self, id: NodeId) -> Program {
         let mut routes: Vec<_> = self.nodes[id].outgoing.iter().map(|route| (*route, &self.routes.all[*route])).collect();

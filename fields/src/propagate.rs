@@ -35,8 +35,12 @@ impl Graph {
         let plain = self.schedule.flags[slot as usize] & SILENCED == 0 && self.explain.is_none();
         let mut copier = Copier { columns: &mut self.columns, changes: &mut self.changes, schedule: &mut self.schedule };
         match self.programs.get(slot) {
-            Program::Hop(hop) if plain => {
-                self.frame.report.copied += copier.chain(&self.programs, slot, *hop);
+            Program::Hop(Hop { field_type, .. }) if plain => {
+                self.frame.report.copied += copier.chain(*field_type, &self.programs, slot);
+            }
+            Program::Link { trail, .. } if plain => {
+                let field_type = self.programs.trail_type(*trail);
+                self.frame.report.copied += copier.chain(field_type, &self.programs, slot);
             }
             Program::Direct(groups) if plain => {
                 let before = std::mem::replace(&mut copier.schedule.turns[slot as usize].propagated, copier.changes.last());
@@ -55,18 +59,16 @@ impl Graph {
 
     fn copy_out_slowly(&mut self, slot: u32) {
         let before = std::mem::replace(&mut self.schedule.turns[slot as usize].propagated, self.changes.last());
-        let mut program = self.programs.take(slot);
-        if program == Program::Unmade {
-            program = self.compile(self.ids[slot as usize]);
+        if *self.programs.get(slot) == Program::Unmade {
+            let program = self.make_program(slot);
+            self.programs.put(slot, program);
         }
-        let hop;
-        let groups = match &program {
-            Program::Unmade => &[][..],
-            Program::Hop(one) => {
-                hop = [self.hop_as_group(slot, *one)];
-                &hop
-            }
-            Program::Direct(groups) | Program::Mixed(groups) => groups,
+        let hop = self.programs.hop(slot).map(|hop| [self.hop_as_group(slot, hop)]);
+        let program = self.programs.take(slot);
+        let groups = match (&program, &hop) {
+            (Program::Direct(groups) | Program::Mixed(groups), _) => groups,
+            (_, Some(hop)) => &hop[..],
+            _ => &[],
         };
         let silenced = self.schedule.flags[slot as usize] & SILENCED != 0;
         for group in groups {

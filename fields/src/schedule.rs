@@ -23,8 +23,9 @@ const INTEREST: u8 = EVALUATES | ROUTED | OBSERVED;
 /// The node has no place in the order.
 pub(crate) const NO_RANK: u32 = u32::MAX;
 
-/// What is known of a node's turns.
+/// What is known of a node's turns. Never across two cache lines.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
 pub(crate) struct Turn {
     /// Writes up to this revision were copied along routes.
     pub(crate) propagated: Revision,

@@ -48,6 +48,29 @@ fn chain_bound(length: usize, order: Order) -> f64 {
     loop_over(&copies, places[0] as usize)
 }
 
+/// The same loop over as much memory, in the same places, as a chain whose writes somebody can ask for later: beside each value the revision of the
+/// field and that of its node.
+fn tracked_bound(length: usize, order: Order) -> f64 {
+    let places = order.places(length + 1);
+    let copies: Vec<(u32, u32)> = places.windows(2).map(|pair| (pair[0], pair[1])).collect();
+    let mut values = vec![0f32; length + 1];
+    let [mut fields, mut nodes] = [(); 2].map(|()| vec![0u64; length + 1]);
+    let laps = 1_000_000_usize.div_ceil(length).min(100);
+    let mut revision = 0;
+    fastest(|round| {
+        for _ in 0..laps {
+            values[places[0] as usize] = round as f32;
+            for (from, to) in black_box(&copies) {
+                revision += 1;
+                values[*to as usize] = values[*from as usize];
+                fields[*to as usize] = revision;
+                nodes[*to as usize] = revision;
+            }
+            black_box((&mut values, &mut fields, &mut nodes));
+        }
+    }) / (laps * length) as f64
+}
+
 /// The source in place 0, the targets behind it.
 fn fan_out_bound(targets: usize, order: Order) -> f64 {
     let copies: Vec<(u32, u32)> = order.places(targets).into_iter().map(|place| (0, place + 1)).collect();
@@ -87,6 +110,7 @@ pub(crate) fn chain(length: usize) {
         let laps = 1_000_000_usize.div_ceil(length).min(100) as u32;
         let ns = frames(&mut graph, fields[places[0] as usize], laps) / length as f64;
         row(&format!("chain of {length}, {}, per hop", order.name()), ns, Some(chain_bound(length, order)));
+        row("  beside arrays with revisions by field and by node", ns, Some(tracked_bound(length, order)));
     }
 }
 

@@ -113,3 +113,69 @@ fn a_chain_of_100_000_takes_one_frame_and_no_deep_stack() {
     let thread = std::thread::Builder::new().stack_size(128 * 1024).spawn(run).unwrap();
     assert_eq!(thread.join().unwrap(), 100_000);
 }
+
+/// Longer than the longest piece of a chain that is kept together.
+const CHAIN: usize = 2600;
+
+#[test]
+fn a_long_chain_may_be_cut_and_watched_anywhere() {
+    for odd in ["none", "observed", "in each frame", "equal", "silent", "written", "cut and mended", "two sources"] {
+        let mut graph = graph();
+        let nodes: Vec<NodeId> = (0..CHAIN).map(|_| graph.create("Plain").unwrap()).collect();
+        let fields: Vec<FieldId> = nodes.iter().map(|node| at(&graph, *node, "real")).collect();
+        // Pieces that were in use before they became one chain.
+        for place in (0..CHAIN - 1).rev() {
+            graph.connect(fields[place], fields[place + 1], Strength::Strong).unwrap();
+            if place % 500 == 0 {
+                graph.set(fields[place], place as f64 + 1.0).unwrap();
+                frame(&mut graph);
+            }
+        }
+        let special = [1, 700, 1025, CHAIN - 2];
+        let (mut copied, mut ends) = (CHAIN - 1, CHAIN);
+        for place in special {
+            let field = fields[place];
+            match odd {
+                "observed" => drop(graph.observe(field, 1).unwrap()),
+                "in each frame" => graph.set_mode(field.node, umbriel_fields::Mode::Always).unwrap(),
+                "cut and mended" => {
+                    let route = graph.routes_to(field).next().unwrap();
+                    graph.disconnect(route);
+                    graph.connect(fields[place - 1], field, Strength::Strong).unwrap();
+                }
+                "two sources" => {
+                    let [other] = create(&mut graph, "Plain");
+                    graph.connect(FieldId { node: other, ..field }, field, Strength::Strong).unwrap();
+                }
+                _ => {}
+            }
+            graph.verify_invariants().unwrap();
+        }
+        frame(&mut graph);
+        let before = graph.revision();
+        graph.set(fields[0], 5.5).unwrap();
+        match odd {
+            // What holds the value already ends the wave; what follows is as it was.
+            "equal" => {
+                graph.set_silent(fields[700], 5.5).unwrap();
+                (copied, ends) = (699, 701);
+            }
+            // A copy is a write of its frame, later than both.
+            "silent" => graph.set_silent(fields[700], 9.0).unwrap(),
+            "written" => graph.set(fields[700], 9.0).unwrap(),
+            _ => {}
+        }
+        assert_eq!(frame(&mut graph).copied, copied, "{odd}");
+        let first: f64 = graph.get(fields[0]).unwrap();
+        for (place, field) in fields.iter().enumerate() {
+            let expected = if place < ends { first } else { 1.0 };
+            assert_eq!(graph.get::<f64>(*field).unwrap(), expected, "{odd}, place {place}");
+        }
+        let revisions: Vec<_> = fields[..ends.min(700)].iter().map(|field| graph.field_revision(*field)).collect();
+        assert!(revisions.windows(2).all(|pair| pair[0] < pair[1]), "{odd}: each copy is a write of its own");
+        let Changes::Nodes(changed) = graph.changes_since(before) else { panic!("the log is short") };
+        assert!(changed.len() >= copied, "{odd}");
+        graph.verify_invariants().unwrap();
+        assert_eq!(frame(&mut graph).copied, 0, "{odd}: nothing is left over");
+    }
+}
