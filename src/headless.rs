@@ -6,7 +6,7 @@ use crate::session::Session;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 use umbriel_displays::WindowSizes;
-use umbriel_render::{Gpu, Renderer};
+use umbriel_render::{FrameStats, Gpu, MapShare, Renderer};
 use umbriel_scene::Picture;
 
 type Failure = Box<dyn std::error::Error>;
@@ -73,6 +73,7 @@ pub(crate) fn draw(
         let pictures = pictures(session, wanted.view, wanted.size)?;
         let stats = renderer.render(session.scene(), &pictures)?;
         tracing::debug!("frame {frame}: {stats:?}");
+        tell_maps(frame, &stats);
         for (place, picture) in pictures.iter().enumerate() {
             // Names stay the same through a sequence, even where displays fail on the way.
             let name = is_named.get_or_insert(pictures.len() > 1).then_some(picture.name.as_str());
@@ -90,6 +91,18 @@ pub(crate) fn draw(
     }
     bar.finish_and_clear();
     Ok(drawn)
+}
+
+/// What shadow maps cost in a frame, and what each light got.
+fn tell_maps(frame: u32, stats: &FrameStats) {
+    if stats.maps == 0 {
+        return;
+    }
+    tracing::info!("frame {frame}: {} of {} shadow maps drawn, in {} draws", stats.map_redraws, stats.maps, stats.map_draws);
+    for share in &stats.map_shares {
+        let MapShare { light, maps, redrawn, asked, side } = share;
+        tracing::info!("frame {frame}: '{light}': {redrawn} of {maps} maps drawn, {side} of {asked} texels wide");
+    }
 }
 
 /// The pictures of the frame; `size` is that of each of them.

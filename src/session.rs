@@ -93,6 +93,12 @@ impl Session {
 
     /// Runs one frame of the world and brings the scene up to date.
     pub(crate) fn step(&mut self, time_s: f64) {
+        if let Source::World(world) = &mut self.source {
+            for light in self.extractor.maps_drawn_once() {
+                // A light that was deleted since has no field to fall back.
+                let _ = world.graph_mut().set_named(light, "shadow_update", "none");
+            }
+        }
         self.problems.extend(self.source.step(time_s));
         if let Some(Err(error)) = self.recording.as_mut().map(|r| r.frame(self.source.graph_mut())) {
             self.problems.push(format!("the recording ends here: {error}"));

@@ -4,7 +4,7 @@ use crate::cache::{GpuMaterial, GpuMesh, Slab};
 use crate::cull::{CentredBox, Planes};
 use crate::uniforms::Instance;
 use glam::{Mat3, Mat4, Vec3};
-use umbriel_scene::{AlphaMode, Drawable, Material, Mesh, Topology};
+use umbriel_scene::{Aabb, AlphaMode, Drawable, Material, Mesh, Topology};
 
 /// What a pipeline is chosen by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -73,12 +73,16 @@ pub(crate) struct Draws {
 /// A drawable that casts, as shadow maps remember it.
 #[derive(Clone, Debug)]
 pub(crate) struct Caster {
+    /// Its place in [`umbriel_scene::Scene::drawables`].
+    pub(crate) index: usize,
     /// Mesh, material and revision of the deformation.
     pub(crate) content: [u64; 3],
     pub(crate) world_from_object: Mat4,
     /// Middle of the mesh at rest, and how far it reaches from there, in the space of the object.
     pub(crate) centre: Vec3,
     pub(crate) reach: f32,
+    /// Deformation included.
+    pub(crate) bounds_in_world: Aabb,
 }
 
 /// GPU copies that drawables are looked up in.
@@ -241,10 +245,12 @@ impl Draws {
     pub(crate) fn casters(&self, drawables: &[Drawable], revision: impl Fn(u32) -> u64) -> Vec<Caster> {
         let casting = self.slots.iter().zip(drawables).enumerate().filter(|(_, (s, _))| s.drawn && s.casts);
         let caster = |(i, (slot, d)): (usize, (&Slot, &Drawable))| Caster {
-            content: [u64::from(slot.mesh) | (i as u64) << 32, u64::from(slot.material), slot.deformed.map_or(0, &revision)],
+            index: i,
+            content: [u64::from(slot.mesh), u64::from(slot.material), slot.deformed.map_or(0, &revision)],
             world_from_object: d.world_from_object,
             centre: d.mesh.bounds.centre(),
             reach: d.mesh.bounds.radius(),
+            bounds_in_world: d.bounds_in_world,
         };
         casting.map(caster).collect()
     }

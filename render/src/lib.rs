@@ -38,4 +38,4 @@ pub use error::Error;
 pub use gpu::Gpu;
 pub use read_back::{GreyPixels, RgbaPixels};
 pub use renderer::Renderer;
-pub use stats::FrameStats;
+pub use stats::{FrameStats, MapShare};

@@ -65,10 +65,21 @@ pub(crate) fn uniform_of(light: &Light, faces: (u32, u32)) -> uniforms::Light {
             MapFilter::None => 0.0,
             MapFilter::Hardware => 1.0,
             MapFilter::Pcf4 => 2.0,
-            MapFilter::Pcf16 => 4.0,
+            MapFilter::Pcf16 | MapFilter::Poisson | MapFilter::Pcss => 4.0,
         },
         slope_bias: map.slope_bias.map_or(-1.0, |b| b.max(0.0)),
         constant_bias: map.constant_bias.map_or(-1.0, |b| b.max(0.0)),
-        spare: [0; 3],
+        map_flags: map_flags(light, faces.1),
+        size: light.size.max(0.0),
+        spare: 0,
     }
+}
+
+fn map_flags(light: &Light, face_count: u32) -> u32 {
+    use uniforms::Light as L;
+    let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
+    flag(light.kind != LightKind::Directional && face_count == 6, L::MAP_CUBE)
+        | flag(light.map.outside_in_shadow && light.map.frustum.is_some(), L::MAP_DARK_OUTSIDE)
+        | flag(light.map.filter == MapFilter::Poisson, L::MAP_POISSON)
+        | flag(light.map.filter == MapFilter::Pcss, L::MAP_PCSS)
 }

@@ -92,6 +92,7 @@ impl Recorder<'_> {
         let (drawer, views) = (self.drawer, self.views);
         self.stats.map_redraws = maps.draw(encoder, self.clock, views, |pass, draws| {
             drawer.draw(pass, draws, self.stats, |pass, kind| maps.set_pipeline(pass, &kind));
+            self.stats.map_draws += draws.len() as u32;
         });
     }
 

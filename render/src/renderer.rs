@@ -98,6 +98,7 @@ impl Renderer {
         self.record(&plans, (&jobs, &soft), &mut stats);
         self.drop_unused();
         stats.maps = self.maps.faces.len() as u32;
+        stats.map_shares.clone_from(&self.maps.shares);
         stats.volume_jobs = purposes.len() as u32;
         stats.prepare_s = (prepared - start).as_secs_f64();
         stats.encode_s = prepared.elapsed().as_secs_f64();

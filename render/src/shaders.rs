@@ -125,8 +125,8 @@ mod tests {
             ours!("surface", "Material", uniforms::Material, base_color emissive alpha_cutoff specular exponent metallic
                 roughness normal_scale occlusion_strength ambient shading alpha_mode textures),
             ours!("surface", "Light", uniforms::Light, position kind direction range color shadow_intensity ambient cos_outer
-                attenuation cone_scale first_face face_count filter_width slope_bias constant_bias),
-            ours!("surface", "MapFace", uniforms::MapFace, map_from_world world_from_map tile light texel),
+                attenuation cone_scale first_face face_count filter_width slope_bias constant_bias map_flags size),
+            ours!("surface", "MapFace", uniforms::MapFace, map_from_world world_from_map tile light texel depth),
             ours!("surface", "Frame", uniforms::Frame, ambient zenith horizon nadir fog_color fog_range fog_kind light_count),
             ours!("film", "Film", uniforms::Film, color),
             ours!("penumbra", "Source", soft::Source, toward_light size),

@@ -20,6 +20,10 @@ pub struct FrameStats {
     pub maps: u32,
     /// How many of them were drawn anew.
     pub map_redraws: u32,
+    /// Draw calls of those.
+    pub map_draws: u32,
+    /// What each light with maps got.
+    pub map_shares: Vec<MapShare>,
     /// Meshes deformed.
     pub deformed: u32,
     /// Jobs of the shadow volumes: lights and groups.
@@ -34,6 +38,21 @@ pub struct FrameStats {
     pub encode_s: f64,
     /// GPU time of each kind of pass in an earlier frame, seconds; empty where the device has no clock.
     pub gpu_s: Vec<(&'static str, f64)>,
+}
+
+/// The shadow maps of one light in a frame.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MapShare {
+    /// Name of the light.
+    pub light: String,
+    /// Number of its maps.
+    pub maps: u32,
+    /// How many of them were drawn anew.
+    pub redrawn: u32,
+    /// Side that was asked for, texels.
+    pub asked: u32,
+    /// Side of each map: less than asked where memory is short.
+    pub side: u32,
 }
 
 /// Messages, each told once.

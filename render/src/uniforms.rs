@@ -84,7 +84,20 @@ pub(crate) struct Light {
     pub(crate) filter_width: f32,
     pub(crate) slope_bias: f32,
     pub(crate) constant_bias: f32,
-    pub(crate) spare: [u32; 3],
+    pub(crate) map_flags: u32,
+    pub(crate) size: f32,
+    pub(crate) spare: u32,
+}
+
+impl Light {
+    /// Six maps into all directions.
+    pub(crate) const MAP_CUBE: u32 = 1;
+    /// What is outside of the map is in shadow.
+    pub(crate) const MAP_DARK_OUTSIDE: u32 = 2;
+    /// Filter over a disc that is turned from place to place.
+    pub(crate) const MAP_POISSON: u32 = 4;
+    /// Penumbrae from the light's size.
+    pub(crate) const MAP_PCSS: u32 = 8;
 }
 
 /// `MapFace` of shaders/shadow_map.wgsl.
@@ -99,7 +112,9 @@ pub(crate) struct MapFace {
     pub(crate) light: [f32; 4],
     /// Size of a texel at distance 1 (perspective) or everywhere (parallel), metres.
     pub(crate) texel: f32,
-    pub(crate) spare: [f32; 3],
+    pub(crate) spare: f32,
+    /// Parallel (w = 0): metres per depth. From a position (w = 1): distance along the axis is `[0] / (depth + [1])`.
+    pub(crate) depth: [f32; 2],
 }
 
 /// `Frame` of shaders/light.wgsl.

@@ -26,6 +26,11 @@ pub(crate) fn pack(sides: &[u32]) -> (u32, u32, Vec<Place>) {
     (layer_side, layer + 1, places)
 }
 
+/// Memory of the texture of so many layers; there are two at least, since some back ends take one for no array.
+pub(crate) fn bytes(side: u32, layers: u32) -> u64 {
+    4 * u64::from(side) * u64::from(side) * u64::from(layers.max(2))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

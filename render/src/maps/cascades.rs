@@ -21,16 +21,20 @@ pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, 
     let make = |window: [f32; 4], near: f32, far: f32, origin: Vec3| {
         let [l, r, b, t] = window;
         let map_from_world = parallel(window, near, far) * light_from_world * Mat4::from_translation(-origin);
-        Projection { map_from_world, eye: (-direction).extend(0.0), texel: (r - l).max(t - b) / size as f32 }
+        let texel = (r - l).max(t - b) / size as f32;
+        Projection { map_from_world, eye: (-direction).extend(0.0), texel, depth: [far - near, 0.0] }
     };
     let casters_in_light = casters.transformed(&light_from_world);
     let all = receivers.union(casters).transformed(&light_from_world);
     if casters.is_empty() || receivers.is_empty() {
         return Vec::new();
     }
-    // Light travels along -z. Nothing that casts may be cut off in front.
+    // Light travels along -z. Nothing that casts may be cut off in front. Ends lie on steps, so that a bird that rises
+    // does not ask for other maps in every frame.
     let slack = 1e-3 * (1.0 + all.radius());
-    let (near, far) = (-all.max.z - slack, -all.min.z + slack);
+    let step = (all.max.z - all.min.z + 2.0 * slack).log2().ceil().exp2() / 16.0;
+    let near = ((-all.max.z - slack) / step).floor() * step;
+    let far = ((-all.min.z + slack) / step).ceil() * step;
     if let Some(window) = light.map.frustum.filter(|[l, r, b, t]| r > l && t > b) {
         let at = light_from_world.transform_point3(light.position).z;
         let [near, far] = light.map.near_far.filter(|[n, f]| f > n).unwrap_or([near + at, far + at]);
@@ -74,7 +78,6 @@ fn slices(eyes: &[Eye]) -> Vec<(f32, f32)> {
     if far <= 0.0 || near >= far {
         return Vec::new();
     }
-    // Six maps are what the shader takes for a light into all directions.
     let most = if far > 400.0 * near { 5.0 } else { 4.0 };
     let count = ((far / near).log2() * 0.8).ceil().clamp(1.0, most);
     let steps = 0.3 * (100.0 * FIRST_SLICE_M / far).min(1.0);

@@ -18,6 +18,8 @@ pub(crate) struct Projection {
     pub(crate) eye: Vec4,
     /// Size of a texel at distance 1 (w = 1) or everywhere, metres.
     pub(crate) texel: f32,
+    /// Parallel (w = 0): metres per depth. From a position (w = 1): distance along the axis is `[0] / (depth + [1])`.
+    pub(crate) depth: [f32; 2],
 }
 
 /// A map, and the corners of what it has to show; without corners it shows all that its light reaches.
@@ -49,6 +51,11 @@ fn perspective([l, r, b, t]: [f32; 4], near: f32, far: Option<f32>) -> Mat4 {
     )
 }
 
+/// See [`Projection::depth`].
+fn depth_of(near: f32, far: Option<f32>) -> [f32; 2] {
+    far.map_or([near, 0.0], |far| [near * far / (far - near), near / (far - near)])
+}
+
 /// Box of parallel light: depth 1 at distance `near` along -z, 0 at `far`.
 pub(crate) fn parallel([l, r, b, t]: [f32; 4], near: f32, far: f32) -> Mat4 {
     Mat4::from_cols(
@@ -78,7 +85,9 @@ pub(crate) fn spot(light: &Light, size: u32) -> Vec<Fit> {
     let view = light_from_world(light.direction.normalize_or(Vec3::NEG_Z)) * Mat4::from_translation(-light.position);
     let map_from_world = perspective([l, r, b, t], near, far) * view;
     let texel = (r - l).max(t - b) / size as f32;
-    vec![Fit { projection: Projection { map_from_world, eye: light.position.extend(1.0), texel }, needed: None }]
+    let depth = depth_of(near, far);
+    let projection = Projection { map_from_world, eye: light.position.extend(1.0), texel, depth };
+    vec![Fit { projection, needed: None }]
 }
 
 /// The six maps of a point light: +x -x +y -y +z -z. Each is a little wider than a right angle, for seams.
@@ -90,7 +99,8 @@ pub(crate) fn point(light: &Light, size: u32) -> Vec<Fit> {
         let view = light_from_world(axis) * Mat4::from_translation(-light.position);
         let map_from_world = perspective([-edge, edge, -edge, edge], near, far) * view;
         let texel = 2.0 * edge / size as f32;
-        Fit { projection: Projection { map_from_world, eye: light.position.extend(1.0), texel }, needed: None }
+        let projection = Projection { map_from_world, eye: light.position.extend(1.0), texel, depth: depth_of(near, far) };
+        Fit { projection, needed: None }
     })
     .to_vec()
 }

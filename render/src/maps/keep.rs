@@ -1,57 +1,107 @@
 //! When a map need not be drawn anew: light and casters stand still, or moved together as one stiff body ("the world
-//! moves": the whole world turns around a visitor who stands still in his room).
+//! moves": the whole world turns around a visitor who stands still in his room). What moved otherwise costs only the
+//! maps that it is in reach of.
 
-use super::fit::Fit;
+use super::atlas::Place;
+use super::fit::{Fit, Projection};
+use crate::cull::{CentredBox, Planes};
 use crate::draws::Caster;
 use glam::{Mat4, Vec3};
 use std::sync::Arc;
-use umbriel_scene::{Light, MapSettings};
+use umbriel_scene::{Aabb, Light, MapSettings};
 
 /// Deviation from a stiff motion that is not seen, as share of the size of all casters: a tenth of a texel of a map of
 /// 2048 that shows all of them.
 const TOLERANCE: f32 = 3e-5;
+/// Casters whose motion is tried for all of them.
+const GUESSES: usize = 4;
 
 /// What cast at the time a map was drawn.
 pub(crate) struct Snapshot {
+    /// In the order of their places.
     pub(crate) casters: Vec<Caster>,
     /// Half the diagonal of the box around them, metres.
     pub(crate) radius: f32,
 }
 
-/// What a light's maps in the texture show.
-pub(crate) struct Record {
-    pub(crate) light: Light,
-    pub(crate) snapshot: Arc<Snapshot>,
-    pub(crate) fits: Vec<Fit>,
-    /// Size and place of each.
-    pub(crate) tiles: Vec<(u32, super::atlas::Place)>,
+/// How casters moved since a snapshot.
+pub(crate) struct Motion {
+    /// Motion of all but the strays.
+    pub(crate) new_from_old: Mat4,
+    /// Boxes, in the world as it is now, of where casters that moved otherwise were and are.
+    pub(crate) strays: Vec<Aabb>,
+    /// All but the strays are exactly where they were.
+    pub(crate) is_exact: bool,
 }
 
-/// The motion of all casters since `old`, where it is that of one stiff body.
-pub(crate) fn motion(old: &Snapshot, new: &Snapshot) -> Option<Mat4> {
-    if old.casters.len() != new.casters.len() {
-        return None;
-    }
-    let Some((first_old, first_new)) = old.casters.first().zip(new.casters.first()) else { return Some(Mat4::IDENTITY) };
-    let new_from_old = if first_old.world_from_object == first_new.world_from_object {
-        Mat4::IDENTITY
-    } else {
-        first_new.world_from_object * first_old.world_from_object.inverse()
-    };
-    if !is_stiff(&new_from_old) {
-        return None;
-    }
+/// A map in the texture.
+#[derive(Clone)]
+pub(crate) struct Held {
+    pub(crate) fit: Fit,
+    /// Its side, and where it lies.
+    pub(crate) tile: (u32, Place),
+    /// The light when the map was drawn.
+    pub(crate) light: Arc<Light>,
+    pub(crate) snapshot: Arc<Snapshot>,
+}
+
+/// How the casters moved from one snapshot to another.
+pub(crate) fn motion(old: &Snapshot, new: &Snapshot) -> Motion {
+    let pairs = pairs(&old.casters, &new.casters);
+    let together: Vec<(&Caster, &Caster)> = pairs.iter().filter_map(|(a, b)| Some(((*a)?, (*b)?))).collect();
     let tolerance = TOLERANCE * new.radius;
-    let agrees = |(a, b): (&Caster, &Caster)| {
-        if a.content != b.content {
-            return false;
+    let strays_of = |m: &Mat4| together.iter().filter(|(a, b)| !moved_by(m, a, b, tolerance)).count();
+    let mut best = (strays_of(&Mat4::IDENTITY), Mat4::IDENTITY);
+    for guess in 0..GUESSES.min(together.len()) {
+        if best.0 == 0 {
+            break;
         }
-        let expected = new_from_old * a.world_from_object;
-        let linear = (0..3).map(|i| (expected.col(i) - b.world_from_object.col(i)).length()).fold(0.0, f32::max);
-        let moved = (expected.transform_point3(a.centre) - b.world_from_object.transform_point3(a.centre)).length();
-        moved + linear * a.reach <= tolerance
-    };
-    old.casters.iter().zip(&new.casters).all(agrees).then_some(new_from_old)
+        let (a, b) = together[guess * together.len() / GUESSES.min(together.len())];
+        let m = b.world_from_object * a.world_from_object.inverse();
+        if a.world_from_object != b.world_from_object && is_stiff(&m) {
+            let strays = strays_of(&m);
+            best = if strays < best.0 { (strays, m) } else { best };
+        }
+    }
+    let new_from_old = best.1;
+    let mut strays = Vec::new();
+    let mut is_exact = new_from_old == Mat4::IDENTITY;
+    for (a, b) in pairs {
+        if let (Some(a), Some(b)) = (a, b)
+            && moved_by(&new_from_old, a, b, tolerance)
+        {
+            is_exact &= a.world_from_object == b.world_from_object;
+            continue;
+        }
+        strays.extend(a.map(|a| a.bounds_in_world.transformed(&new_from_old)));
+        strays.extend(b.map(|b| b.bounds_in_world));
+    }
+    Motion { new_from_old, strays, is_exact }
+}
+
+/// Casters before and after; both lists are in the order of places.
+fn pairs<'a>(old: &'a [Caster], new: &'a [Caster]) -> Vec<(Option<&'a Caster>, Option<&'a Caster>)> {
+    let mut pairs = Vec::with_capacity(old.len().max(new.len()));
+    let (mut old, mut new) = (old.iter().peekable(), new.iter().peekable());
+    loop {
+        pairs.push(match (old.peek(), new.peek()) {
+            (None, None) => return pairs,
+            (Some(a), Some(b)) if a.index == b.index => (old.next(), new.next()),
+            (Some(a), Some(b)) if a.index < b.index => (old.next(), None),
+            (Some(_), None) => (old.next(), None),
+            _ => (None, new.next()),
+        });
+    }
+}
+
+fn moved_by(new_from_old: &Mat4, a: &Caster, b: &Caster, tolerance: f32) -> bool {
+    if a.content != b.content {
+        return false;
+    }
+    let expected = *new_from_old * a.world_from_object;
+    let linear = (0..3).map(|i| (expected.col(i) - b.world_from_object.col(i)).length()).fold(0.0, f32::max);
+    let moved = (expected.transform_point3(a.centre) - b.world_from_object.transform_point3(a.centre)).length();
+    moved + linear * a.reach <= tolerance
 }
 
 fn is_stiff(m: &Mat4) -> bool {
@@ -61,30 +111,41 @@ fn is_stiff(m: &Mat4) -> bool {
     lengths && x.dot(y).abs() < 1e-4 && y.dot(z).abs() < 1e-4 && z.dot(x).abs() < 1e-4 && m.determinant() > 0.0
 }
 
-impl Record {
-    /// The old maps as they serve now, or `None` where they have to be drawn anew. `wanted` are the maps that a new fit
-    /// would draw, `new_from_old` is the motion of the casters.
-    pub(crate) fn kept(&self, light: &Light, wanted: &[Fit], new_from_old: Mat4) -> Option<Vec<Fit>> {
+impl Held {
+    /// The map as it lies now if it moved along with its light, or `None` where light and casters moved relative to each
+    /// other, or another map is `wanted`.
+    pub(crate) fn carried(&self, light: &Light, wanted: &Fit, new_from_old: &Mat4) -> Option<Fit> {
         let same_map = |a: &MapSettings, b: &MapSettings| (a.size, a.frustum, a.near_far) == (b.size, b.frustum, b.near_far);
-        let stayed = |a: Vec3, b: Vec3| (a - b).length() <= TOLERANCE * self.snapshot.radius.max(1e-3);
+        let tolerance = TOLERANCE * self.snapshot.radius.max(1e-3);
+        let stayed = |a: Vec3, b: Vec3| (a - b).length() <= tolerance;
         let has_moved_along = stayed(new_from_old.transform_vector3(self.light.direction), light.direction)
             && stayed(new_from_old.transform_point3(self.light.position), light.position);
         if self.light.kind != light.kind || !same_map(&self.light.map, &light.map) || !has_moved_along {
             return None;
         }
-        if wanted.len() != self.fits.len() {
+        let mut fit = self.fit.clone();
+        fit.projection = fit.projection.carried(new_from_old);
+        let drift = fit.projection.map_from_world * light.position.extend(1.0);
+        if wanted.projection.eye.w > 0.5 && drift.truncate().truncate().abs().max_element().max(drift.w.abs()) > 10.0 * tolerance
+        {
             return None;
         }
-        let old_from_new = new_from_old.inverse();
-        let mut fits = self.fits.clone();
-        for (fit, wanted) in fits.iter_mut().zip(wanted) {
-            fit.projection.map_from_world *= old_from_new;
-            fit.projection.eye = wanted.projection.eye;
-            if !fit.still_serves(wanted) {
-                return None;
-            }
-        }
-        Some(fits)
+        fit.projection.eye = wanted.projection.eye;
+        fit.still_serves(wanted).then_some(fit)
+    }
+
+    /// Was something in the map's reach before or after it strayed?
+    pub(crate) fn is_reached(fit: &Fit, strays: &[Aabb]) -> bool {
+        let planes = Planes::new(&fit.projection.map_from_world);
+        strays.iter().any(|b| planes.may_see(&CentredBox::from(*b)))
+    }
+}
+
+impl Projection {
+    /// As it lies after its world moved.
+    pub(crate) fn carried(&self, new_from_old: &Mat4) -> Projection {
+        let map_from_world = self.map_from_world * new_from_old.inverse();
+        Projection { map_from_world, eye: *new_from_old * self.eye, ..*self }
     }
 }
 
@@ -105,29 +166,47 @@ mod tests {
     use super::*;
 
     fn snapshot(places: &[Mat4]) -> Snapshot {
-        let caster = |m: &Mat4| Caster { content: [1, 2, 0], world_from_object: *m, centre: Vec3::ZERO, reach: 1.0 };
-        Snapshot { casters: places.iter().map(caster).collect(), radius: 10.0 }
+        let unit = Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        let caster = |(index, m): (usize, &Mat4)| Caster {
+            index,
+            content: [1, 2, 0],
+            world_from_object: *m,
+            centre: Vec3::ZERO,
+            reach: 1.0,
+            bounds_in_world: unit.transformed(m),
+        };
+        Snapshot { casters: places.iter().enumerate().map(caster).collect(), radius: 10.0 }
     }
 
     #[test]
-    fn only_stiff_motions_count() {
-        let places = [Mat4::from_translation(Vec3::X * 3.0), Mat4::from_rotation_z(0.3), Mat4::from_scale(Vec3::splat(2.0))];
+    fn what_does_not_move_with_the_others_strays() {
+        let places = [
+            Mat4::from_translation(Vec3::X * 3.0),
+            Mat4::from_rotation_z(0.3),
+            Mat4::from_scale(Vec3::splat(2.0)),
+            Mat4::from_translation(Vec3::Z * 9.0),
+        ];
         let turn = Mat4::from_rotation_y(0.7) * Mat4::from_translation(Vec3::new(1.0, 2.0, 3.0));
         let slip = Mat4::from_translation(Vec3::Y * 0.01);
-        let each = |f: &dyn Fn(usize, Mat4) -> Mat4| snapshot(&std::array::from_fn::<Mat4, 3, _>(|i| f(i, places[i])));
+        let each = |f: &dyn Fn(usize, Mat4) -> Mat4| snapshot(&std::array::from_fn::<Mat4, 4, _>(|i| f(i, places[i])));
         let old = each(&|_, m| m);
-        for (name, new, expected) in [
-            ("nothing moved", each(&|_, m| m), true),
-            ("all turned", each(&|_, m| turn * m), true),
-            ("one slipped", each(&|i, m| if i == 2 { slip * m } else { m }), false),
-            ("the first slipped", each(&|i, m| if i == 0 { slip * m } else { m }), false),
-            ("all grew", each(&|_, m| Mat4::from_scale(Vec3::splat(1.1)) * m), false),
-            ("all mirrored", each(&|_, m| Mat4::from_scale(Vec3::new(-1.0, 1.0, 1.0)) * m), false),
-            ("one fewer", snapshot(&places[..2]), false),
+        // What happened, the places now, boxes of strays, exact.
+        for (name, new, strays, is_exact) in [
+            ("nothing moved", each(&|_, m| m), 0, true),
+            ("all turned", each(&|_, m| turn * m), 0, false),
+            ("one slipped", each(&|i, m| if i == 2 { slip * m } else { m }), 2, true),
+            ("the first slipped", each(&|i, m| if i == 0 { slip * m } else { m }), 2, true),
+            ("the first slipped while all turned", each(&|i, m| if i == 0 { slip * turn * m } else { turn * m }), 2, false),
+            ("all grew", each(&|i, m| Mat4::from_scale(Vec3::splat(1.1 + i as f32)) * m), 8, true),
+            ("all mirrored", each(&|_, m| Mat4::from_scale(Vec3::new(-1.0, 1.0, 1.0)) * m), 8, true),
+            ("two fewer", snapshot(&places[..2]), 2, true),
         ] {
-            assert_eq!(motion(&old, &new).is_some(), expected, "{name}");
+            let found = motion(&old, &new);
+            assert_eq!((found.strays.len(), found.is_exact), (strays, is_exact), "{name}");
         }
-        let m = motion(&old, &each(&|_, m| turn * m)).unwrap();
+        let m = motion(&old, &each(&|_, m| turn * m)).new_from_old;
         assert!((m.transform_point3(Vec3::ONE) - turn.transform_point3(Vec3::ONE)).length() < 1e-4);
+        let back = motion(&snapshot(&places[..2]), &old);
+        assert_eq!(back.strays.len(), 2, "casters that came");
     }
 }

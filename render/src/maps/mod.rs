@@ -6,24 +6,25 @@ mod fit;
 mod keep;
 mod picture;
 mod pipeline;
+mod share;
 
 use crate::clock::Clock;
 use crate::draws::{Caster, Draw, Draws, Kind};
 use crate::layouts::Layouts;
 use crate::lights::shines;
 use crate::slots::Slots;
+use crate::stats::MapShare;
 use crate::uniforms;
 use crate::{cull::Planes, shaders};
 pub(crate) use cascades::Eye;
-use fit::Projection;
-use keep::{Record, Snapshot};
+use fit::{Fit, Projection};
+use keep::{Held, Motion, Snapshot};
+use share::Demand;
 use std::collections::HashMap;
 use std::sync::Arc;
-use umbriel_scene::{Aabb, LightKind, Scene, ShadowMethod};
+use umbriel_scene::{Aabb, Light, LightKind, MapUpdate, Scene, ShadowMethod};
 
 const MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Texture memory for all maps; beyond it sizes are halved, with a report.
-const MEMORY_BYTES: u64 = 2 << 30;
 
 /// One map of one light.
 pub(crate) struct Face {
@@ -40,7 +41,14 @@ pub(crate) struct Face {
 /// The maps of the frame, and what draws them.
 pub(crate) struct Maps {
     pub(crate) faces: Vec<Face>,
-    records: Vec<Record>,
+    /// What every light got in this frame.
+    pub(crate) shares: Vec<MapShare>,
+    /// Maps in the texture, by place of their light in the scene.
+    held: HashMap<usize, Vec<Held>>,
+    /// Importance of each light.
+    levels: HashMap<usize, i32>,
+    /// What was asked for last, with how much memory, and the sides that came of it.
+    room: (Vec<Demand>, u64, Vec<u32>),
     pub(crate) whole: wgpu::TextureView,
     pub(crate) texture: wgpu::Texture,
     layers: Vec<wgpu::TextureView>,
@@ -49,6 +57,16 @@ pub(crate) struct Maps {
     layout: wgpu::PipelineLayout,
     pipelines: HashMap<(u8, bool), wgpu::RenderPipeline>,
     empty: wgpu::RenderPipeline,
+}
+
+/// The maps that a light asks for.
+struct Wanted {
+    /// Place of the light in the scene.
+    index: usize,
+    /// Its maps stay as they were drawn.
+    is_frozen: bool,
+    fits: Vec<Fit>,
+    demand: Demand,
 }
 
 /// What maps are fitted to.
@@ -73,7 +91,10 @@ impl Maps {
         let empty = pipeline::emptying(device, &module);
         Maps {
             faces: Vec::new(),
-            records: Vec::new(),
+            shares: Vec::new(),
+            held: HashMap::new(),
+            levels: HashMap::new(),
+            room: (Vec::new(), 0, Vec::new()),
             whole,
             texture,
             layers,
@@ -85,8 +106,7 @@ impl Maps {
         }
     }
 
-    /// Chooses the maps of the frame. True where the texture is a
-    /// new one, which bind groups must learn.
+    /// Chooses the maps of the frame. True where the texture is a new one, which bind groups must learn.
     pub(crate) fn choose(
         &mut self,
         device: &wgpu::Device,
@@ -96,77 +116,138 @@ impl Maps {
         mut report: impl FnMut(String),
     ) -> bool {
         self.faces.clear();
+        self.shares.clear();
         let limit = device.limits().max_texture_dimension_2d;
-        let mapped: Vec<usize> = (0..scene.lights.len())
-            .filter(|i| scene.lights[*i].shadows == ShadowMethod::Map && shines(&scene.lights[*i]))
-            .collect();
-        if mapped.is_empty() {
-            self.records.clear();
-            return false;
-        }
-        let mut lights = Vec::new();
-        for &index in &mapped {
-            let light = &scene.lights[index];
+        let mut wanted: Vec<Wanted> = Vec::new();
+        for (index, light) in scene.lights.iter().enumerate() {
+            if light.shadows != ShadowMethod::Map || !shines(light) {
+                continue;
+            }
             let size = light.map.size.clamp(1, limit);
             if size != light.map.size {
                 report(format!("light '{}': shadow map size {}: using {size}", light.name, light.map.size));
             }
-            let fits = match light.kind {
-                LightKind::Directional => cascades::cascades(light, size, &around.eyes, around.receivers, around.casters),
-                LightKind::Spot { .. } => fit::spot(light, size),
-                LightKind::Point => fit::point(light, size),
-            };
-            lights.push((index, size, fits));
+            let fits = fits_of(light, size, around);
+            let held = self.held.get(&index).filter(|h| !h.is_empty() && light.map.update == MapUpdate::Never);
+            let is_frozen = held.is_some_and(|h| light.kind == LightKind::Directional || h.len() == fits.len());
+            let faces = held.filter(|_| is_frozen).map_or(fits.len(), Vec::len);
+            let level = share::level(light, &around.eyes, self.levels.get(&index).copied());
+            wanted.push(Wanted { index, is_frozen, fits, demand: Demand { size, faces, level } });
         }
-        let sides: Vec<u32> = lights.iter().flat_map(|(_, size, fits)| fits.iter().map(|_| *size)).collect();
-        let (sides, is_new) = self.make_room(device, sides, report);
-        let (_, _, places) = atlas::pack(&sides);
+        self.levels = wanted.iter().map(|w| (w.index, w.demand.level)).collect();
+        if wanted.is_empty() {
+            self.held.clear();
+            return false;
+        }
+        let demands: Vec<Demand> = wanted.iter().map(|w| w.demand).collect();
+        let (tiles, is_new) = self.make_room(device, demands, scene.map_memory_bytes);
         let snapshot = Arc::new(Snapshot { casters, radius: around.casters.radius() });
-        let old = std::mem::take(&mut self.records);
-        let mut tiles = sides.into_iter().zip(places);
-        for (number, (index, size, wanted)) in lights.into_iter().enumerate() {
-            let light = &scene.lights[index];
-            let tiles: Vec<(u32, atlas::Place)> = tiles.by_ref().take(wanted.len()).collect();
-            let record = old.get(number).filter(|r| !is_new && r.tiles == tiles);
-            let kept = record.and_then(|r| {
-                let new_from_old = keep::motion(&r.snapshot, &snapshot)?;
-                r.kept(light, &wanted, new_from_old)
-            });
-            let is_stale = kept.is_none();
-            let fits = kept.unwrap_or(wanted);
-            for (fit, (tile, place)) in fits.iter().zip(&tiles) {
-                let mut projection = fit.projection;
-                projection.texel *= size as f32 / *tile as f32;
-                let draws = Vec::new();
-                self.faces.push(Face { light: index, projection, size: *tile, place: *place, slot: 0, draws, is_stale });
+        let mut motions: HashMap<*const Snapshot, Motion> = HashMap::new();
+        let mut old = std::mem::take(&mut self.held);
+        for (wanted, tiles) in wanted.into_iter().zip(tiles) {
+            let light = &scene.lights[wanted.index];
+            let old = old.remove(&wanted.index).unwrap_or_default();
+            for held in &old {
+                let motion = || keep::motion(&held.snapshot, &snapshot);
+                motions.entry(Arc::as_ptr(&held.snapshot)).or_insert_with(motion);
             }
-            // A kept map stays as old as it is: deviations do not add up.
-            self.records.push(match record.filter(|_| !is_stale) {
-                Some(r) => Record { light: r.light.clone(), snapshot: r.snapshot.clone(), fits: r.fits.clone(), tiles },
-                None => Record { light: light.clone(), snapshot: snapshot.clone(), fits, tiles },
+            let mut held = self.faces_of_light(light, &wanted, &tiles, &old, &motions, &snapshot, around);
+            if is_new {
+                self.faces.iter_mut().filter(|f| f.light == wanted.index).for_each(|f| f.is_stale = true);
+                held.iter_mut().for_each(|h| h.snapshot = snapshot.clone());
+            }
+            let faces = self.faces.iter().filter(|f| f.light == wanted.index);
+            self.shares.push(MapShare {
+                light: light.name.clone(),
+                maps: held.len() as u32,
+                redrawn: faces.filter(|f| f.is_stale).count() as u32,
+                asked: wanted.demand.size,
+                side: tiles.first().map_or(0, |t| t.0),
             });
+            self.held.insert(wanted.index, held);
         }
         is_new
     }
 
-    /// Makes the texture as large as squares of these sides need. Gives the sides that memory allows, and whether the
-    /// texture is a new one.
-    fn make_room(&mut self, device: &wgpu::Device, mut sides: Vec<u32>, mut report: impl FnMut(String)) -> (Vec<u32>, bool) {
-        let bytes = |sides: &[u32]| {
-            let (side, layers, _) = atlas::pack(sides);
-            4 * u64::from(side) * u64::from(side) * u64::from(layers)
-        };
-        while bytes(&sides) > MEMORY_BYTES {
-            sides.iter_mut().for_each(|s| *s = (*s / 2).max(1));
-            report(format!("shadow maps need more than {} MiB: halving their sizes", MEMORY_BYTES >> 20));
+    /// Which of a light's maps are kept and which are drawn anew.
+    #[allow(clippy::too_many_arguments, reason = "a light's maps before and now, and what moved")]
+    fn faces_of_light(
+        &mut self,
+        light: &Light,
+        wanted: &Wanted,
+        tiles: &[(u32, atlas::Place)],
+        old: &[Held],
+        motions: &HashMap<*const Snapshot, Motion>,
+        snapshot: &Arc<Snapshot>,
+        around: &Surroundings,
+    ) -> Vec<Held> {
+        let side = tiles.first().map_or(wanted.demand.size, |t| t.0);
+        let smaller = (side != wanted.demand.size).then(|| fits_of(light, side, around));
+        let fits = smaller.filter(|f| f.len() == wanted.fits.len()).unwrap_or_else(|| wanted.fits.clone());
+        let motion_of = |held: &Held| &motions[&Arc::as_ptr(&held.snapshot)];
+        let is_same_set = old.len() == fits.len();
+        let carry = |(held, fit): (&Held, &Fit)| held.carried(light, fit, &motion_of(held).new_from_old);
+        let mut carried: Vec<Option<Fit>> = old.iter().zip(&fits).map(carry).collect();
+        if !is_same_set || light.kind != LightKind::Directional && carried.iter().any(Option::is_none) {
+            // The six maps of a cube are one: their axes stay together.
+            carried.iter_mut().for_each(|c| *c = None);
         }
-        let (side, layers, _) = atlas::pack(&sides);
+        let now = Arc::new(light.clone());
+        let mut all = Vec::new();
+        for (number, tile) in tiles.iter().enumerate() {
+            let held = old.get(number);
+            let carried = carried.get(number).cloned().flatten();
+            let lies_here = held.is_some_and(|h| h.tile == *tile);
+            let (fit, is_stale) = match (held, carried) {
+                (Some(held), carried) if wanted.is_frozen => {
+                    let frozen = || Fit { projection: held.fit.projection.carried(&motion_of(held).new_from_old), needed: None };
+                    let from_light = || if held.fit.projection.eye.w > 0.5 { fits[number].clone() } else { frozen() };
+                    (carried.unwrap_or_else(from_light), !lies_here)
+                }
+                (Some(held), Some(fit)) => {
+                    let is_asked = matches!(light.map.update, MapUpdate::Always | MapUpdate::Next);
+                    let is_stale = is_asked || !lies_here || Held::is_reached(&fit, &motion_of(held).strays);
+                    (fit, is_stale)
+                }
+                _ => (fits[number].clone(), true),
+            };
+            let (projection, place) = (fit.projection, tile.1);
+            self.faces.push(Face { light: wanted.index, projection, size: tile.0, place, slot: 0, draws: Vec::new(), is_stale });
+            all.push(match held.filter(|_| !is_stale) {
+                // A map that moved along stays as old as it is: deviations do not add up.
+                Some(held) if motion_of(held).is_exact && !wanted.is_frozen => {
+                    Held { snapshot: snapshot.clone(), ..held.clone() }
+                }
+                Some(held) => held.clone(),
+                None => Held { fit, tile: *tile, light: now.clone(), snapshot: snapshot.clone() },
+            });
+        }
+        all
+    }
+
+    /// Places for the maps of every light, in a texture that is as large as they need and memory allows. True where it is
+    /// a new one.
+    fn make_room(
+        &mut self,
+        device: &wgpu::Device,
+        demands: Vec<Demand>,
+        memory_bytes: u64,
+    ) -> (Vec<Vec<(u32, atlas::Place)>>, bool) {
+        let most_layers = device.limits().max_texture_array_layers;
+        if self.room.0 != demands || self.room.1 != memory_bytes {
+            let sides = share::sides(&demands, memory_bytes, most_layers);
+            self.room = (demands, memory_bytes, sides);
+        }
+        let (demands, _, sides) = &self.room;
+        let all: Vec<u32> = demands.iter().zip(sides).flat_map(|(d, side)| std::iter::repeat_n(*side, d.faces)).collect();
+        let (side, layers, places) = atlas::pack(&all);
         let now = self.texture.size();
         let is_new = (now.width, now.depth_or_array_layers) != (side, layers.max(2));
         if is_new {
             (self.texture, self.whole, self.layers) = make_texture(device, side, layers);
         }
-        (sides, is_new)
+        let mut tiles = all.into_iter().zip(places);
+        (demands.iter().map(|d| tiles.by_ref().take(d.faces).collect()).collect(), is_new)
     }
 
     /// Finds the casters of every map and the pipelines that they need.
@@ -194,7 +275,8 @@ impl Maps {
             tile: [face.place[0], face.place[1], face.size, face.place[2]],
             light: face.projection.eye.to_array(),
             texel: face.projection.texel,
-            spare: [0.0; 3],
+            spare: 0.0,
+            depth: face.projection.depth,
         };
         self.faces.iter().map(of).collect()
     }
@@ -247,6 +329,14 @@ impl Maps {
         if let Some(pipeline) = self.pipelines.get(&pipeline::key_of(kind)) {
             pass.set_pipeline(pipeline);
         }
+    }
+}
+
+fn fits_of(light: &Light, size: u32, around: &Surroundings) -> Vec<Fit> {
+    match light.kind {
+        LightKind::Directional => cascades::cascades(light, size, &around.eyes, around.receivers, around.casters),
+        LightKind::Spot { .. } => fit::spot(light, size),
+        LightKind::Point => fit::point(light, size),
     }
 }
 

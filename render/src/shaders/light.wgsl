@@ -32,11 +32,19 @@ struct Light {
     // Manual bias; below 0 it tunes itself.
     slope_bias: f32,
     constant_bias: f32,
+    map_flags: u32,
+    // Of the source: tangent of half the angle under which it is seen (directional), or radius, metres.
+    size: f32,
 };
 
 const DIRECTIONAL: u32 = 0u;
 const SPOT: u32 = 1u;
 const POINT: u32 = 2u;
+
+const MAP_CUBE: u32 = 1u;
+const MAP_DARK_OUTSIDE: u32 = 2u;
+const MAP_POISSON: u32 = 4u;
+const MAP_PCSS: u32 = 8u;
 
 @group(3) @binding(0) var<uniform> frame: Frame;
 @group(3) @binding(1) var<storage, read> lights: array<Light>;

@@ -13,6 +13,8 @@ struct MapFace {
     light: vec4<f32>,
     // Size of a texel at distance 1 from a position, or everywhere for parallel light, metres.
     texel: f32,
+    // Parallel light: metres per depth. From a position: distance along the axis is x / (depth + y).
+    depth: vec2<f32>,
 };
 
 @group(3) @binding(2) var<storage, read> map_faces: array<MapFace>;
@@ -24,7 +26,7 @@ struct MapFace {
 fn map_visibility(light: Light, p_in_world: vec3<f32>, face_normal: vec3<f32>) -> f32 {
     var face_index = light.first_face;
     var found = false;
-    if light.face_count == 6u {
+    if (light.map_flags & MAP_CUBE) != 0u {
         face_index += major_axis(map_faces[face_index], p_in_world);
         found = true;
     } else {
@@ -37,7 +39,7 @@ fn map_visibility(light: Light, p_in_world: vec3<f32>, face_normal: vec3<f32>) -
         }
     }
     if !found {
-        return 1.0;
+        return select(1.0, 0.0, (light.map_flags & MAP_DARK_OUTSIDE) != 0u);
     }
     return face_visibility(light, map_faces[face_index], p_in_world, face_normal);
 }
@@ -108,6 +110,13 @@ fn face_visibility(light: Light, face: MapFace, p_in_world: vec3<f32>, face_norm
         depth_per_texel = clamp(depth_per_texel, vec2<f32>(-steepest), vec2<f32>(steepest));
     }
 
+    if (light.map_flags & (MAP_POISSON | MAP_PCSS)) != 0u {
+        let r = Receiver(t, ndc.z + tolerance.x, depth_per_texel, tolerance.y);
+        if (light.map_flags & MAP_PCSS) != 0u {
+            return contact_hardening(light, face, r);
+        }
+        return disc_filtered(face, r, DISC_RADIUS, DISC_SAMPLES);
+    }
     if light.filter_width == 0.0 {
         let i = clamp(floor(t), vec2<f32>(0.0), vec2<f32>(side - 1.0));
         let stored = textureLoad(maps, vec2<u32>(i) + face.tile.xy, face.tile.w, 0);
@@ -155,4 +164,99 @@ fn filtered(face: MapFace, width: f32, t: vec2<f32>, depth: f32, depth_per_texel
         }
     }
     return lit / (width * width);
+}
+
+// The receiver as the disc filters see it: texel, depth there, its slope, and tolerance per texel.
+struct Receiver {
+    t: vec2<f32>,
+    depth: f32,
+    depth_per_texel: vec2<f32>,
+    tolerance: f32,
+};
+
+const DISC_SAMPLES: u32 = 16u;
+// As wide as 16 bilinear comparisons, texels.
+const DISC_RADIUS: f32 = 2.5;
+const PENUMBRA_SAMPLES: u32 = 32u;
+// No penumbra is looked for beyond this, texels.
+const WIDEST_PENUMBRA: f32 = 160.0;
+
+// Place of a sample of the unit disc (Vogel 1979), turned.
+fn on_disc(i: u32, count: u32, turn: f32) -> vec2<f32> {
+    let angle = f32(i) * 2.3999632 + turn;
+    return sqrt((f32(i) + 0.5) / f32(count)) * vec2<f32>(cos(angle), sin(angle));
+}
+
+// The turn follows from the place in the map: it stays with the world, and both eyes see the same.
+// (Jimenez 2014, Next generation post processing: interleaved gradient noise.)
+fn turn_at(t: vec2<f32>) -> f32 {
+    return 6.2831853 * fract(52.9829189 * fract(dot(floor(t * 4.0), vec2<f32>(0.06711056, 0.00583715))));
+}
+
+// The four texels around a place, and the place between them.
+struct Quad {
+    stored: vec4<f32>,
+    expected: vec4<f32>,
+    share: vec2<f32>,
+};
+
+fn quad_at(face: MapFace, r: Receiver, offset: vec2<f32>) -> Quad {
+    let side = f32(face.tile.z);
+    let corner = floor(r.t + offset + 0.5);
+    let inside = clamp(corner, vec2<f32>(1.0), vec2<f32>(side - 1.0));
+    let near = inside - 0.5 - r.t;
+    let far = inside + 0.5 - r.t;
+    let expected = vec4<f32>(
+        dot(r.depth_per_texel, vec2<f32>(near.x, far.y)),
+        dot(r.depth_per_texel, far),
+        dot(r.depth_per_texel, vec2<f32>(far.x, near.y)),
+        dot(r.depth_per_texel, near),
+    );
+    let place = (inside + vec2<f32>(face.tile.xy)) / vec2<f32>(textureDimensions(maps));
+    let stored = textureGather(maps, maps_sampler, place, face.tile.w);
+    let share = saturate(r.t + offset + 0.5 - corner);
+    return Quad(stored, r.depth + expected + r.tolerance * (1.0 + min(length(offset), 2.0)), share);
+}
+
+fn disc_filtered(face: MapFace, r: Receiver, radius: f32, count: u32) -> f32 {
+    let turn = turn_at(r.t);
+    var lit = 0.0;
+    for (var i = 0u; i < count; i++) {
+        let q = quad_at(face, r, radius * on_disc(i, count, turn));
+        let one = select(vec4<f32>(0.0), vec4<f32>(1.0), q.stored <= q.expected);
+        // Order of textureGather: (near, far), (far, far), (far, near), (near, near).
+        lit += mix(mix(one.w, one.z, q.share.x), mix(one.x, one.y, q.share.x), q.share.y);
+    }
+    return lit / f32(count);
+}
+
+// Fernando 2005, Percentage-closer soft shadows: how far the casters around are tells how wide the penumbra is.
+fn contact_hardening(light: Light, face: MapFace, r: Receiver) -> f32 {
+    let turn = turn_at(r.t);
+    let is_parallel = face.light.w < 0.5;
+    let distance = select(face.depth.x / max(r.depth + face.depth.y, 1e-9), 0.0, is_parallel);
+    // As far as the nearest possible caster could be: the front of the map, or a tenth of the way to the light.
+    var search = light.size * (1.0 - r.depth) * face.depth.x / face.texel;
+    if !is_parallel {
+        search = 9.0 * light.size / (distance * face.texel);
+    }
+    search = clamp(search, 1.0, WIDEST_PENUMBRA);
+    var depth = 0.0;
+    var casters = 0.0;
+    for (var i = 0u; i < PENUMBRA_SAMPLES; i++) {
+        let q = quad_at(face, r, search * on_disc(i, PENUMBRA_SAMPLES, turn));
+        let blocks = select(vec4<f32>(0.0), vec4<f32>(1.0), q.stored > q.expected);
+        depth += dot(blocks, q.stored);
+        casters += dot(blocks, vec4<f32>(1.0));
+    }
+    if casters == 0.0 {
+        return 1.0;
+    }
+    depth /= casters;
+    var width = light.size * max(depth - r.depth, 0.0) * face.depth.x / face.texel;
+    if !is_parallel {
+        let caster = face.depth.x / max(depth + face.depth.y, 1e-9);
+        width = light.size * max(distance - caster, 0.0) / max(caster * distance * face.texel, 1e-9);
+    }
+    return disc_filtered(face, r, clamp(width, 1.0, search), PENUMBRA_SAMPLES);
 }

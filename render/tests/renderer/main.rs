@@ -3,6 +3,7 @@
 mod deformation;
 mod layouts;
 mod lights;
+mod maps;
 mod outputs;
 mod shadows;
 mod shapes;

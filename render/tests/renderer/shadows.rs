@@ -52,6 +52,9 @@ fn agreement(name: &str, light: Light, margin: f32) -> (f32, u32) {
     (right as f32 / counted as f32, dark)
 }
 
+const FILTERS: [MapFilter; 6] =
+    [MapFilter::None, MapFilter::Hardware, MapFilter::Pcf4, MapFilter::Pcf16, MapFilter::Poisson, MapFilter::Pcss];
+
 #[test]
 fn a_ball_throws_the_shadow_that_geometry_says() {
     let slanted = Vec3::new(0.3, -1.0, -0.2).normalize();
@@ -66,7 +69,7 @@ fn a_ball_throws_the_shadow_that_geometry_says() {
         ("point", lamp(LightKind::Point)),
     ];
     for (name, light) in lights {
-        for filter in [MapFilter::None, MapFilter::Hardware, MapFilter::Pcf4, MapFilter::Pcf16] {
+        for filter in FILTERS {
             let map = MapSettings { size: 1024, filter, ..Default::default() };
             let light = Light { shadows: ShadowMethod::Map, map, ..light.clone() };
             let (share, dark) = agreement("ball_map", light, 0.02);

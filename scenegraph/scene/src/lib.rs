@@ -25,7 +25,7 @@ mod volume;
 pub use adjacency::{Edge, Edges};
 pub use bounds::Aabb;
 pub use deform::{Deformed, deformed};
-pub use light::{Light, LightKind, MapFilter, MapSettings, ShadowMethod};
+pub use light::{Light, LightKind, MapFilter, MapSettings, MapUpdate, ShadowMethod};
 pub use material::{AlphaMode, Filter, Image, Material, Sampler, Shading, TextureRef, Wrap};
 pub use mesh::{Mesh, MeshError, MorphTarget, Topology};
 pub use scene::{Background, Drawable, Film, Fog, FogKind, Pose, Scene, StencilGroup, StencilMode};

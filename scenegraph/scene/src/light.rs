@@ -80,6 +80,25 @@ pub enum MapFilter {
     /// 16 bilinear comparisons.
     #[default]
     Pcf16,
+    /// 16 bilinear comparisons over a disc that is turned from place to place.
+    Poisson,
+    /// Penumbrae that follow from [`Light::size`]: hard at the contact, wider with the distance to the caster
+    /// (Fernando 2005, Percentage-closer soft shadows).
+    Pcss,
+}
+
+/// When a shadow map is drawn anew (003 section 4.1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum MapUpdate {
+    /// When the light and a caster in its reach moved relative to each other, or a caster changed.
+    #[default]
+    Auto,
+    /// Never: it stays as it was drawn. It is drawn where there is none yet.
+    Never,
+    /// In every frame.
+    Always,
+    /// In this frame. Whoever keeps the scene says [`MapUpdate::Never`] from the next frame on.
+    Next,
 }
 
 /// Settings of a shadow map. `None` means fitted to the scene.
@@ -97,6 +116,10 @@ pub struct MapSettings {
     pub constant_bias: Option<f32>,
     /// Filter of look-ups.
     pub filter: MapFilter,
+    /// When the map is drawn anew.
+    pub update: MapUpdate,
+    /// What is outside of a `frustum` set by hand is in shadow (003) instead of lit.
+    pub outside_in_shadow: bool,
 }
 
 impl Default for MapSettings {
@@ -108,6 +131,8 @@ impl Default for MapSettings {
             slope_bias: None,
             constant_bias: None,
             filter: MapFilter::default(),
+            update: MapUpdate::default(),
+            outside_in_shadow: false,
         }
     }
 }

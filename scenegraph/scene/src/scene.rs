@@ -21,6 +21,8 @@ pub struct Scene {
     pub fog: Option<Fog>,
     /// Factor of the linear picture before it is encoded; 1 leaves it.
     pub exposure: f32,
+    /// Texture memory for all shadow maps, bytes. Where it is short, the least important lights get smaller maps.
+    pub map_memory_bytes: u64,
 }
 
 impl Default for Scene {
@@ -34,6 +36,7 @@ impl Default for Scene {
             background: Background::default(),
             fog: None,
             exposure: 1.0,
+            map_memory_bytes: 1 << 30,
         }
     }
 }

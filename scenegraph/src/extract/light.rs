@@ -5,7 +5,9 @@ use super::read::{Reader, label};
 use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
 use std::f32::consts::PI;
 use umbriel_fields::{Graph, NodeId};
-use umbriel_scene::{Light, LightKind, MapFilter, MapSettings, ShadowMethod, Silhouettes, VolumeCounting, VolumeSettings};
+use umbriel_scene::{
+    Light, LightKind, MapFilter, MapSettings, MapUpdate, ShadowMethod, Silhouettes, VolumeCounting, VolumeSettings,
+};
 
 /// One place of a light in the world.
 pub(super) struct LightEntry {
@@ -118,6 +120,11 @@ fn shadows(read: &Reader<'_>) -> ShadowMethod {
     }
 }
 
+/// In the order of the node's choices.
+const FILTERS: [MapFilter; 6] =
+    [MapFilter::None, MapFilter::Hardware, MapFilter::Pcf4, MapFilter::Pcf16, MapFilter::Poisson, MapFilter::Pcss];
+const UPDATES: [MapUpdate; 4] = [MapUpdate::Auto, MapUpdate::Never, MapUpdate::Always, MapUpdate::Next];
+
 /// Zero means fitted; anything that makes no frustum is reported and fitted.
 fn map_settings(read: &Reader<'_>, parallel: bool, check: &mut Check<'_>) -> MapSettings {
     let size: i32 = check.finite("shadow_size", read.get("shadow_size"), 2048, |s: &i32| *s > 0);
@@ -137,7 +144,9 @@ fn map_settings(read: &Reader<'_>, parallel: bool, check: &mut Check<'_>) -> Map
         size: size as u32,
         frustum: (frustum != Vec4::ZERO).then(|| frustum.to_array()),
         near_far: (near_far != Vec2::ZERO).then(|| near_far.to_array()),
-        filter: [MapFilter::None, MapFilter::Hardware, MapFilter::Pcf4, MapFilter::Pcf16][read.choice("filter").min(3) as usize],
+        filter: FILTERS[(read.choice("filter") as usize).min(FILTERS.len() - 1)],
+        update: UPDATES[(read.choice("shadow_update") as usize).min(UPDATES.len() - 1)],
+        outside_in_shadow: read.choice("shadow_outside") == 1,
     }
 }
 

@@ -85,7 +85,8 @@ fn make(graph: &Graph, appearance: NodeId, pictures: &mut Pictures, problems: &m
         _ => AlphaMode::Opaque,
     };
     made.double_sided = look.get("double_sided");
-    CachedMaterial { material: Arc::new(made), casts_shadow: look.get("shadow_caster"), deps, stamp: (0, 0) }
+    let casts_shadow = look.get("shadow_caster") && (made.alpha != AlphaMode::Blend || look.get("transparent_caster"));
+    CachedMaterial { material: Arc::new(made), casts_shadow, deps, stamp: (0, 0) }
 }
 
 fn surface(graph: &Graph, read: &Reader<'_>, texture: &mut dyn FnMut(&str) -> Option<TextureRef>) -> Material {

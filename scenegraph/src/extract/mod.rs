@@ -45,7 +45,7 @@ use std::path::PathBuf;
 use sweep::{Touched, lod_choice, sweep};
 use texture::Pictures;
 use umbriel_fields::{Graph, NodeId, Revision};
-use umbriel_scene::{Scene, StencilGroup};
+use umbriel_scene::{MapUpdate, Scene, StencilGroup};
 
 /// Most places in the world, so that nodes which share children cannot multiply without end.
 const MAX_PLACES: usize = 1_000_000;
@@ -174,6 +174,14 @@ impl Extractor {
     /// The place of a light node in [`Scene::lights`]; None if it is off, hidden or no light of the world.
     pub fn light_of(&self, node: NodeId) -> Option<usize> {
         light_slot(&self.instances, &self.lights, node)
+    }
+
+    /// Light nodes whose map was asked for in this frame only. Before the next one their `shadow_update` falls back to
+    /// none (003 section 4.1), which is up to whoever may write to the graph.
+    pub fn maps_drawn_once(&self) -> Vec<NodeId> {
+        let once = |light: &LightEntry| light.placed.as_ref().is_some_and(|l| l.map.update == MapUpdate::Next);
+        let lights = self.instances.list.iter().filter(|i| i.role == Role::Light);
+        lights.zip(&self.lights).filter(|(_, light)| once(light)).map(|(instance, _)| instance.node).collect()
     }
 
     /// The places in [`Scene::drawables`] of all shapes at and below a node, in tree order.

@@ -3,7 +3,7 @@
 use super::instance::{Instances, unit};
 use super::problem::Problems;
 use super::read::{Reader, label};
-use crate::nodes::environment::{AMBIENT, HORIZON, NADIR, ZENITH};
+use crate::nodes::environment::{AMBIENT, HORIZON, NADIR, SHADOW_MEMORY_MIB, ZENITH};
 use glam::{Mat4, Quat, Vec3};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -83,6 +83,7 @@ pub(super) fn read_environment(graph: &Graph, globals: &Globals, room: &Room, pr
         (range.is_finite() && range > 0.0).then(made)
     });
     (scene.ambient, scene.exposure) = (AMBIENT, 1.0);
+    scene.map_memory_bytes = (SHADOW_MEMORY_MIB as u64) << 20;
     if let Some(surroundings) = of_type("Environment").next() {
         scene.ambient = color(&surroundings, "ambient", AMBIENT);
         let exposure: f32 = surroundings.get("exposure");
@@ -90,6 +91,10 @@ pub(super) fn read_environment(graph: &Graph, globals: &Globals, room: &Room, pr
         let problem = (!fine).then(|| format!("{exposure} makes no sense here; 1 is used"));
         problems.set(graph, surroundings.node, "exposure", problem);
         scene.exposure = if fine { exposure } else { 1.0 };
+        let memory: i32 = surroundings.get("shadow_memory");
+        let problem = (memory < 1).then(|| format!("{memory} makes no sense here; {SHADOW_MEMORY_MIB} is used"));
+        problems.set(graph, surroundings.node, "shadow_memory", problem);
+        scene.map_memory_bytes = (if memory < 1 { SHADOW_MEMORY_MIB } else { memory } as u64) << 20;
     }
 }
 

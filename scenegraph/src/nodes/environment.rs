@@ -9,6 +9,8 @@ pub(crate) const ZENITH: Vec3 = vec3(0.02, 0.04, 0.09);
 pub(crate) const HORIZON: Vec3 = vec3(0.10, 0.13, 0.18);
 /// See [`ZENITH`].
 pub(crate) const NADIR: Vec3 = vec3(0.03, 0.03, 0.03);
+/// Memory of shadow maps where a world says nothing, MiB.
+pub(crate) const SHADOW_MEMORY_MIB: i32 = 1024;
 /// Ambient light where a world says nothing.
 pub(crate) const AMBIENT: Vec3 = vec3(0.08, 0.08, 0.08);
 
@@ -26,6 +28,11 @@ pub(super) fn types() -> Vec<NodeType> {
             .field(Field::new("visibility_range", 0.0f32).unit("m").doc("Distance at which nothing but fog is seen; 0: no fog.")),
         NodeType::new("Environment", "Light from everywhere, and the brightness of the picture. The first one counts.")
             .field(color("ambient", AMBIENT, "Linear RGB that reaches every surface."))
-            .field(Field::new("exposure", 1.0f32).doc("Factor of the linear picture before it is encoded.")),
+            .field(Field::new("exposure", 1.0f32).doc("Factor of the linear picture before it is encoded."))
+            .field(
+                Field::new("shadow_memory", SHADOW_MEMORY_MIB)
+                    .unit("MiB")
+                    .doc("Texture memory for all shadow maps. Where it is short, the least important lights get smaller maps."),
+            ),
     ]
 }

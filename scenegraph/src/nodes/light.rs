@@ -49,7 +49,12 @@ fn common(intensity: f32, unit: &'static str) -> Vec<Field> {
         Field::new("volume_floor", f32::NEG_INFINITY)
             .unit("m")
             .doc("Height below which nothing is seen, such as that of the sea; volumes end there."),
-        Field::choice("filter", &["none", "hardware", "pcf4", "pcf16"], "pcf16").doc("How the map is looked up."),
+        Field::choice("filter", &["none", "hardware", "pcf4", "pcf16", "poisson", "pcss"], "pcf16")
+            .doc("How the map is looked up; pcss makes penumbrae that follow from the light's size."),
+        Field::choice("shadow_update", &["auto", "none", "always", "next_frame_only"], "auto")
+            .doc("When the map is drawn anew; after next_frame_only it is none (003 section 4.1)."),
+        Field::choice("shadow_outside", &["lit", "shadow"], "lit")
+            .doc("What is outside of a `shadow_frustum` set by hand (003)."),
     ]
 }
 

@@ -20,6 +20,9 @@ pub(super) fn types() -> Vec<NodeType> {
             )
             .field(Field::new("alpha_cutoff", 0.5f32).range(0.0, 1.0).doc("Smallest alpha that is there, for mask."))
             .field(Field::new("shadow_caster", true).doc("Shapes with this appearance throw shadows."))
+            .field(
+                Field::new("transparent_caster", false).doc("Half-transparent shapes throw shadows too, as if they were opaque."),
+            )
             .field(Field::new("double_sided", false).doc("Seen and lit from both sides.")),
     ]
 }

@@ -6,7 +6,8 @@ use glam::{Mat4, Vec2, Vec3, Vec4, vec3};
 use std::f32::consts::PI;
 use umbriel_fields::Value;
 use umbriel_scene::{
-    AlphaMode, Background, LightKind, MapFilter, MapSettings, Shading, ShadowMethod, Silhouettes, VolumeCounting, VolumeSettings,
+    AlphaMode, Background, LightKind, MapFilter, MapSettings, MapUpdate, Shading, ShadowMethod, Silhouettes, VolumeCounting,
+    VolumeSettings,
 };
 
 #[test]
@@ -164,9 +165,67 @@ fn the_light_of_the_paper() {
         near_far: Some([0.01, 100.0]),
         slope_bias: None,
         constant_bias: None,
-        filter: MapFilter::Pcf16,
+        ..MapSettings::default()
     };
     assert_eq!(found.map, expected);
+}
+
+#[test]
+fn settings_of_maps_are_read() {
+    let mut w = World::new();
+    let light = w.below(&[w.root()], "DirectionalLight", "sun");
+    let surroundings = w.below(&[w.root()], "Environment", "air");
+    let filters = [
+        ("none", MapFilter::None),
+        ("hardware", MapFilter::Hardware),
+        ("pcf4", MapFilter::Pcf4),
+        ("pcf16", MapFilter::Pcf16),
+        ("poisson", MapFilter::Poisson),
+        ("pcss", MapFilter::Pcss),
+    ];
+    for (word, filter) in filters {
+        w.set(light, "filter", word);
+        w.update();
+        assert_eq!(w.light(light).map.filter, filter);
+    }
+    let rules = [
+        ("none", MapUpdate::Never),
+        ("always", MapUpdate::Always),
+        ("next_frame_only", MapUpdate::Next),
+        ("auto", MapUpdate::Auto),
+    ];
+    for (word, update) in rules {
+        w.set(light, "shadow_update", word);
+        w.update();
+        assert_eq!(w.light(light).map.update, update);
+        let once: Vec<_> = if update == MapUpdate::Next { vec![light] } else { Vec::new() };
+        assert_eq!(w.extractor.maps_drawn_once(), once, "{word}");
+    }
+    w.set(light, "shadow_outside", "shadow");
+    w.set(surroundings, "shadow_memory", 64);
+    w.update();
+    assert!(w.light(light).map.outside_in_shadow && w.scene.map_memory_bytes == 64 << 20 && w.problems().is_empty());
+    w.set(surroundings, "shadow_memory", 0);
+    w.update();
+    assert_eq!(w.problems(), ["Environment 'air', shadow_memory: 0 makes no sense here; 1024 is used"]);
+    assert_eq!(w.scene.map_memory_bytes, 1 << 30);
+}
+
+/// Half-transparent shapes throw shadows where their appearance says so.
+#[test]
+fn transparent_casters_are_a_choice() {
+    let mut w = World::new();
+    let shape = w.shape(&[w.root()], "pane");
+    let look = w.node("Appearance", "");
+    w.set(shape, "appearance", look);
+    for (mode, transparent_caster, expected) in
+        [("opaque", false, true), ("mask", false, true), ("blend", false, false), ("blend", true, true), ("auto", false, true)]
+    {
+        w.set(look, "alpha_mode", mode);
+        w.set(look, "transparent_caster", transparent_caster);
+        w.update();
+        assert_eq!(w.scene.drawables[0].casts_shadow, expected, "{mode} {transparent_caster}");
+    }
 }
 
 #[test]
