@@ -68,6 +68,9 @@ pub(crate) struct Run {
     /// The display or viewpoint to show, by name
     #[arg(long)]
     pub(crate) view: Option<String>,
+    /// Draw nothing but the shadow of this light, by name: white where it shines, black where it does not
+    #[arg(long, requires = "headless")]
+    pub(crate) shadow_of: Option<String>,
     /// File to write; where there are several frames or displays, their number and name are put before `.png`
     #[arg(long, requires = "headless")]
     pub(crate) out: Option<PathBuf>,
@@ -153,6 +156,9 @@ pub(crate) struct ShadowError {
     /// Score this mask against the truth instead of rendering: the tracer against another's
     #[arg(long, conflicts_with = "method")]
     pub(crate) trace_only: bool,
+    /// Score the penumbra too, against the share of the light's disc that rays see; soft volumes are always scored so
+    #[arg(long, conflicts_with = "scene")]
+    pub(crate) penumbra: bool,
     /// Write a picture of the differences: red where a shadow is missing, blue where one is wrong
     #[arg(long)]
     pub(crate) diff: Option<PathBuf>,

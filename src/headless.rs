@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 use umbriel_displays::WindowSizes;
 use umbriel_render::{FrameStats, Gpu, MapShare, Renderer};
-use umbriel_scene::Picture;
+use umbriel_scene::{Picture, PictureKind};
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -25,7 +25,12 @@ pub(crate) fn run(args: &Run) -> Result<usize, Failure> {
         session.step(0.0); // what starts with the world starts before the jump
     }
     let time_s = |frame: u32| args.time + f64::from(frame) / args.fps;
-    let drawn = draw(&mut session, 0..args.frames, time_s, &Wanted { view: args.view.as_deref(), size: args.size, out: &out })?;
+    let drawn = draw(
+        &mut session,
+        0..args.frames,
+        time_s,
+        &Wanted { view: args.view.as_deref(), size: args.size, shadow_of: args.shadow_of.as_deref(), out: &out },
+    )?;
     if let Some(frames) = session.finish_recording()? {
         println!("{frames} frames recorded");
     }
@@ -39,6 +44,8 @@ pub(crate) struct Wanted<'a> {
     pub(crate) view: Option<&'a str>,
     /// Pixels of each picture.
     pub(crate) size: Option<[u32; 2]>,
+    /// The light whose shadow alone is shown, by name.
+    pub(crate) shadow_of: Option<&'a str>,
     pub(crate) out: &'a Path,
 }
 
@@ -70,7 +77,11 @@ pub(crate) fn draw(
     let is_sequence = frames.len() > 1;
     for frame in frames {
         session.step(time_s(frame));
-        let pictures = pictures(session, wanted.view, wanted.size)?;
+        let mut pictures = pictures(session, wanted.view, wanted.size)?;
+        if let Some(name) = wanted.shadow_of {
+            let light = session.light_named(name).ok_or_else(|| session.no_light(name))?;
+            pictures.iter_mut().for_each(|p| p.kind = PictureKind::LightVisibility(light));
+        }
         let stats = renderer.render(session.scene(), &pictures)?;
         tracing::debug!("frame {frame}: {stats:?}");
         tell_maps(frame, &stats);

@@ -169,6 +169,12 @@ impl Session {
         self.extractor.light_of(self.graph().find(name)?)
     }
 
+    /// What to say where a name is no light's.
+    pub(crate) fn no_light(&self, name: &str) -> String {
+        let names: Vec<&str> = self.scene.lights.iter().map(|l| l.name.as_str()).filter(|n| !n.is_empty()).collect();
+        format!("no light '{name}' is on in this world; there are: {}", names.join(", "))
+    }
+
     /// Moves the room through the world by mouse or keys.
     pub(crate) fn navigate(&mut self, input: Input<'_>) {
         if let Err(error) = self.try_navigate(input) {

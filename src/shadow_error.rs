@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use umbriel_displays::WindowSizes;
 use umbriel_render::{Gpu, Renderer, RgbaPixels};
-use umbriel_scene::{Mask, Picture, PictureKind, Scene, ShadowMethod, TraceOptions, Tracer, View, difference, score};
+use umbriel_scene::{Mask, Picture, PictureKind, Scene, ShadowMethod, Shares, TraceOptions, Tracer, View, difference, score};
 use umbriel_scenegraph::Extractor;
 
 type Failure = Box<dyn std::error::Error>;
@@ -58,6 +58,14 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
     }
     println!("{shown}, view '{}' {}x{}, {by}", subject.view.name, subject.view.size[0], subject.view.size[1]);
     println!("disagreement={:.4}% iou={:.4} pixels={}", 100.0 * score.disagreement, score.iou, score.pixels);
+    let light = &subject.scene.lights[subject.light];
+    if args.penumbra || (light.soft && light.shadows == ShadowMethod::Volume) {
+        let score = trace_shares(&subject)?.score(&visibility)?;
+        println!(
+            "light of size {}: mean error in the penumbra={:.4} overall={:.5} penumbra pixels={} pixels={}",
+            light.size, score.penumbra, score.overall, score.penumbra_pixels, score.pixels
+        );
+    }
     Ok(subject.problems.len())
 }
 
@@ -84,7 +92,7 @@ fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
     let view = pictures.into_iter().flat_map(|p| p.views).next().ok_or("there is nothing to see the world from")?;
     let lights = &session.scene().lights;
     let light = match &args.light {
-        Some(name) => session.light_named(name).ok_or_else(|| no_light(name, lights))?,
+        Some(name) => session.light_named(name).ok_or_else(|| session.no_light(name))?,
         None => {
             let casting = lights.iter().position(|l| l.shadows != ShadowMethod::None);
             casting.or((!lights.is_empty()).then_some(0)).ok_or("the world has no light that is on")?
@@ -94,11 +102,6 @@ fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
     let options = TraceOptions { sub_samples: args.sub_samples, eps_scale: 1e-7, ..TraceOptions::default() };
     let problems = session.problems();
     Ok(Subject { scene: std::mem::take(session.scene_mut()), light, view, options, problems })
-}
-
-fn no_light(name: &str, lights: &[umbriel_scene::Light]) -> String {
-    let names: Vec<&str> = lights.iter().map(|l| l.name.as_str()).filter(|n| !n.is_empty()).collect();
-    format!("no light '{name}' is on in this world; there are: {}", names.join(", "))
 }
 
 /// The models of a scene file, with its light alone.
@@ -153,6 +156,19 @@ fn trace(subject: &Subject) -> Result<Mask, Failure> {
     let mask = tracer.visibility(light, &subject.view, &subject.options, &|rows| bar.set_position(rows.into()));
     bar.finish_and_clear();
     Ok(mask?)
+}
+
+/// Rays to the disc of the light, where it is partly hidden.
+const DISC_RAYS: usize = 256;
+
+fn trace_shares(subject: &Subject) -> Result<Shares, Failure> {
+    let bar = progress(subject.view.size[1], "rows of penumbra traced");
+    let tracer = Tracer::new(&subject.scene);
+    let light = &subject.scene.lights[subject.light];
+    let options = TraceOptions { sub_samples: subject.options.sub_samples.min(2), ..subject.options.clone() };
+    let shares = tracer.shares(light, &subject.view, &options, DISC_RAYS, &|rows| bar.set_position(rows.into()));
+    bar.finish_and_clear();
+    Ok(shares?)
 }
 
 /// One byte per pixel, and the device that drew it.

@@ -3,7 +3,8 @@
 use super::problem::Problems;
 use super::read::{Reader, label, stamp};
 use super::skin::JointBounds;
-use crate::geometry::{self, ConeParts, CylinderParts, MeshFields, mesh_from_fields};
+use super::texture::{Pictures, picture};
+use crate::geometry::{self, ConeParts, CylinderParts, DepthCamera, MeshFields, mesh_from_fields};
 use glam::{Vec2, Vec3};
 use slotmap::SecondaryMap;
 use std::collections::HashMap;
@@ -34,7 +35,7 @@ pub(super) struct Meshes {
 }
 
 impl Meshes {
-    pub(super) fn get(&mut self, graph: &Graph, node: NodeId, problems: &mut Problems) -> CachedMesh {
+    pub(super) fn get(&mut self, graph: &Graph, node: NodeId, pictures: &mut Pictures, problems: &mut Problems) -> CachedMesh {
         if let Some(known) = self.cache.get(node).filter(|c| c.stamp == stamp(graph, &c.deps)) {
             return known.clone();
         }
@@ -45,6 +46,10 @@ impl Meshes {
                 let targets = read.nodes("targets").into_iter().map(|(_, id)| id);
                 deps.extend(targets);
                 mesh_from_fields(mesh_fields(&read, &deps[1..])).map(Arc::new).map_err(|e| e.to_string())
+            }
+            "DepthPicture" => {
+                deps.extend(read.node("depth"));
+                seen(&read, deps.get(1).map(|depth| Reader::new(graph, *depth)), pictures, problems)
             }
             kind => self.solid(kind, &read),
         };
@@ -114,6 +119,24 @@ fn solid(kind: &str, read: &Reader<'_>) -> Result<(SolidKey, MakeSolid), String>
         }
         other => Err(format!("a {other} is no geometry")),
     }
+}
+
+/// The surface of a picture with depth.
+fn seen(
+    read: &Reader<'_>,
+    depth: Option<Reader<'_>>,
+    pictures: &mut Pictures,
+    problems: &mut Problems,
+) -> Result<Arc<Mesh>, String> {
+    let depth = depth.filter(|d| &*d.graph.type_of(d.node).name == "ImageTexture").ok_or("depth is no ImageTexture")?;
+    let picture = picture(&depth, pictures, problems, "the shape is not shown").ok_or("its depth cannot be read")?;
+    if picture.width < 2 || picture.height < 2 {
+        return Err(format!("its depth has {} x {} pixels, it needs 2 x 2 at least", picture.width, picture.height));
+    }
+    let camera = DepthCamera { fov_rad: read.get("field_of_view"), near: read.get("near"), far: read.get("far") };
+    positive(["field_of_view", "near", "far"], [camera.fov_rad, camera.near, camera.far])?;
+    let mesh = geometry::depth_picture(&picture, camera).checked().map_err(|e| e.to_string())?;
+    Ok(Arc::new(mesh))
 }
 
 /// The numbers' bits, if each is a length that makes a surface.

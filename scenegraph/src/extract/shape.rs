@@ -95,7 +95,7 @@ fn read(graph: &Graph, shape: NodeId, resources: &mut Resources) -> ShapeState {
     let read = Reader::new(graph, shape);
     let Resources { meshes, materials, pictures, problems } = resources;
     let geometry = read.node("geometry");
-    let cached = geometry.map(|node| meshes.get(graph, node, problems));
+    let cached = geometry.map(|node| meshes.get(graph, node, pictures, problems));
     let material = materials.get(graph, read.node("appearance"), pictures, problems);
     let skin_node = read.node("skin");
     let mut deps = cached.as_ref().map(|c| c.deps.clone()).unwrap_or_default();

@@ -94,16 +94,7 @@ pub(super) fn texture(
     let node = material.node(field)?;
     deps.push(node);
     let read = Reader::new(graph, node);
-    let url: Arc<str> = read.get("url");
-    let memory: Option<Arc<umbriel_fields::Image>> = read.get("image");
-    let (field, image) = match (&memory, &*url) {
-        (Some(image), _) => ("image", pictures.of_memory(image)),
-        (None, "") => ("image", Err("neither image nor url is set; the surface is shown without it".to_owned())),
-        (None, url) => ("url", pictures.of_file(url).map_err(|e| format!("{e}; the surface is shown without it"))),
-    };
-    for each in ["image", "url"] {
-        problems.set(graph, node, each, image.as_ref().err().filter(|_| each == field).cloned());
-    }
+    let image = picture(&read, pictures, problems, "the surface is shown without it");
     let uv_from_mesh = uv_from_mesh(&read);
     problems.set(
         graph,
@@ -112,11 +103,26 @@ pub(super) fn texture(
         uv_from_mesh.is_none().then(|| "translation, rotation or scale is not finite; left out".into()),
     );
     Some(TextureRef {
-        image: image.ok()?,
+        image: image?,
         sampler: sampler(&read),
         uv_set: read.get::<i32>("uv_set").clamp(0, 1) as u8,
         uv_from_mesh: uv_from_mesh.unwrap_or(Affine2::IDENTITY),
     })
+}
+
+/// The picture of an ImageTexture. One that is missing or broken is reported, with what comes of it.
+pub(super) fn picture(read: &Reader<'_>, pictures: &mut Pictures, problems: &mut Problems, instead: &str) -> Option<Arc<Image>> {
+    let url: Arc<str> = read.get("url");
+    let memory: Option<Arc<umbriel_fields::Image>> = read.get("image");
+    let (field, image) = match (&memory, &*url) {
+        (Some(image), _) => ("image", pictures.of_memory(image)),
+        (None, "") => ("image", Err(format!("neither image nor url is set; {instead}"))),
+        (None, url) => ("url", pictures.of_file(url).map_err(|e| format!("{e}; {instead}"))),
+    };
+    for each in ["image", "url"] {
+        problems.set(read.graph, read.node, each, image.as_ref().err().filter(|_| each == field).cloned());
+    }
+    image.ok()
 }
 
 /// KHR_texture_transform: u' = T R S u, turning counter-clockwise as seen, where v is down.

@@ -6,12 +6,14 @@
 
 mod builder;
 mod cuboid;
+mod depth_picture;
 mod from_node;
 mod plane;
 mod round;
 mod sphere;
 
 pub use cuboid::cuboid;
+pub use depth_picture::{DepthCamera, depth_picture};
 pub(crate) use from_node::{MeshFields, mesh_from_fields};
 pub use plane::plane;
 pub use round::{ConeParts, CylinderParts, cone, cylinder};

@@ -43,6 +43,22 @@ fn solids() -> Vec<NodeType> {
         NodeType::new("Plane", "A flat rectangle around the origin in the xz plane, facing up.")
             .field(Field::new("size", Vec2::splat(2.0)).unit("m").doc("Lengths along x and z."))
             .field(Field::new("segments", 1i32).range(1.0, 1024.0).doc("Squares along each side.")),
+        NodeType::new(
+            "DepthPicture",
+            "What a photo's camera at the origin saw along -z, for shadows to fall on (004 figure 19).",
+        )
+        .alias("Backdrop")
+        .field(
+            Field::node("depth").doc("An ImageTexture: depth is 256 red + green of 65535, or grey; the photo is the appearance."),
+        )
+        .field(
+            Field::new("field_of_view", std::f32::consts::FRAC_PI_4)
+                .unit("rad")
+                .range(0.0, f64::from(std::f32::consts::PI))
+                .doc("Whole vertical angle of the photo."),
+        )
+        .field(metres("near", 1.0, "Distance along -z where depth is black."))
+        .field(metres("far", 10.0, "Distance along -z where depth is white.")),
     ]
 }
 

@@ -163,6 +163,46 @@ fn pictures_that_cannot_be_read_are_reported_and_the_shape_is_shown() {
 }
 
 #[test]
+fn pictures_with_depth_are_surfaces_that_follow_their_pictures() {
+    let mut w = World::new();
+    let grey = |side: u32, level: u8| Image { width: side, height: side, rgba: vec![level; 4 * (side * side) as usize].into() };
+    let (seen, depth) = (w.node("Backdrop", "seen"), w.node("ImageTexture", "depth"));
+    let shape = w.below(&[w.root()], "Shape", "it");
+    w.set(shape, "geometry", seen);
+    // What is set, triangles, problem.
+    type Row = (&'static str, Box<dyn Fn(&mut World)>, Option<&'static str>);
+    let rows: Vec<Row> = vec![
+        ("no depth", Box::new(|_| ()), Some("'seen', geometry: depth is no ImageTexture")),
+        (
+            "depth without picture",
+            Box::new(move |w| w.set(seen, "depth", depth)),
+            Some("'depth', image: neither image nor url is set"),
+        ),
+        ("too small", Box::new(move |w| w.set(depth, "image", grey(1, 0))), Some("it needs 2 x 2 at least")),
+        ("fine", Box::new(move |w| w.set(depth, "image", grey(3, 0))), None),
+        ("near is not finite", Box::new(move |w| w.set(seen, "near", f32::NAN)), Some("near is NaN, it must be above 0")),
+        ("fine again", Box::new(move |w| w.set(seen, "near", 4.0f32)), None),
+    ];
+    for (name, change, problem) in rows {
+        change(&mut w);
+        w.update();
+        let problems = w.problems();
+        match problem {
+            None => {
+                assert!(problems.is_empty(), "{name}: {problems:?}");
+                assert_eq!(w.drawable("it").mesh.triangle_count(), 8, "{name}");
+            }
+            Some(expected) => assert!(problems.iter().any(|p| p.contains(expected)), "{name}: {problems:?}"),
+        }
+    }
+    let middle = |w: &World| w.drawable("it").mesh.positions[4];
+    assert!(middle(&w).abs_diff_eq(vec3(0.0, 0.0, -4.0), 1e-5), "{}", middle(&w));
+    w.set(depth, "image", grey(3, 255));
+    w.update();
+    assert!(middle(&w).abs_diff_eq(vec3(0.0, 0.0, -10.0), 1e-5), "{}", middle(&w));
+}
+
+#[test]
 fn materials_that_are_not_finite_are_plain_grey() {
     let mut w = World::new();
     let [_, _, material] = painted(&mut w, "Material");
