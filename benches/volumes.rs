@@ -1,6 +1,6 @@
 //! What shadow volumes cost: harbour in seven channels, and the silhouette of a mesh of a million edges.
 //!
-//! `cargo bench --bench volumes`. Rows are drawn in turns, so that all meet the same load of the machine; the ratio is the
+//! `cargo bench --bench volumes`, with names of rows behind `--` to draw those alone. Rows are drawn in turns, so that all meet the same load of the machine; the ratio is the
 //! median of the frames' ratios, each to the first row's frame of its turn. Where the system tells, time is what all
 //! threads of the process spent on processors: with a software driver that is the frame, whatever else runs beside it.
 
@@ -44,8 +44,13 @@ fn main() -> Outcome<()> {
         ("map of 2048", with(&scene, ShadowMethod::Map, plain)),
         ("no shadows", with(&scene, ShadowMethod::None, plain)),
     ];
+    let only: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let rows: Vec<Row> = rows.into_iter().filter(|(name, _)| only.is_empty() || only.iter().any(|o| o == name)).collect();
     table(&gpu, "harbour, seven channels of 320x256", rows, &pictures)?;
 
+    if !only.is_empty() {
+        return Ok(());
+    }
     let still = ball_over_floor(Mat4::IDENTITY);
     let picture = [Picture::mono(View {
         name: "ball".into(),

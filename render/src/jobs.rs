@@ -6,6 +6,7 @@ use crate::draws::Draws;
 use crate::lights::Lights;
 use crate::plan::{BLACK_FILM, Purpose};
 use crate::slots::Slots;
+use crate::stats::Problems;
 use crate::uniforms;
 use crate::volumes::{Cone, Surface, VolumeCaster, VolumeJob, VolumeLight};
 use glam::{Vec3, Vec4};
@@ -19,6 +20,7 @@ pub(crate) fn jobs(
     meshes: &Slab<Mesh, Option<GpuMesh>>,
     deformer: &Deformer,
     films: &mut Slots<uniforms::Film>,
+    problems: &mut Problems,
 ) -> (Vec<VolumeJob>, Vec<Purpose>) {
     let black = films.push(&uniforms::Film { color: [0.0, 0.0, 0.0, 1.0] });
     debug_assert_eq!(black, BLACK_FILM);
@@ -45,6 +47,15 @@ pub(crate) fn jobs(
             continue;
         }
         let light = &scene.lights[group.light];
+        if light.shadows != ShadowMethod::None {
+            let by = if light.shadows == ShadowMethod::Map { "map" } else { "volume" };
+            problems.report(format!(
+                "stencil shadow '{}': its light '{}' casts by {by} already, so its film is left out: nothing is darkened twice. \
+                 Set `shadows` of the light to none, or `mode` to additive",
+                group.name, light.name
+            ));
+            continue;
+        }
         let [r, g, b, a] = film.color.to_array();
         let a = a * light.shadow_intensity.clamp(0.0, 1.0);
         let film = films.push(&uniforms::Film { color: [r * a, g * a, b * a, a] });
@@ -103,6 +114,7 @@ fn caster(
         bounds_in_world: drawable.bounds_in_world,
         surface: match drawable.material.alpha {
             AlphaMode::Opaque if drawable.material.double_sided => Surface::BothSides,
+            AlphaMode::Opaque if deformed.is_none() => Surface::Front,
             _ => Surface::InParts,
         },
     })

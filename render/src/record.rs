@@ -98,7 +98,9 @@ impl Recorder<'_> {
 
     /// One view: surfaces, then light and films by shadow volumes, then what is half-transparent.
     pub(crate) fn view(&mut self, encoder: &mut wgpu::CommandEncoder, view: &ViewPlan, to: &ViewTarget) {
-        let is_last = view.steps.is_empty();
+        // The stencil starts empty, so the first volumes may be counted in the pass that filled depth.
+        let joins = |number: usize| number == 0 && view.steps[0].soft.is_none();
+        let is_last = view.steps.is_empty() || joins(0) && view.steps.len() == 1;
         let mut pass = begin_view(encoder, self.clock, "surfaces", to, Part { is_first: true, is_last, keeps_stencil: false });
         pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
         self.surfaces(&mut pass, &view.opaque, view.base_pass());
@@ -108,24 +110,19 @@ impl Recorder<'_> {
             pass.draw(0..3, 0..1);
         }
         for (number, step) in view.steps.iter().enumerate() {
-            drop(pass);
             let is_last = number + 1 == view.steps.len();
+            if joins(number) {
+                self.count(&mut pass, view, step.job);
+                self.use_counts(&mut pass, view, &step.then);
+                continue;
+            }
+            drop(pass);
             if let (Some(layers), Some(soft)) = (&step.soft, &to.soft) {
                 pass = self.soft_step(encoder, view, (&step.then, layers), (to, soft), is_last);
                 continue;
             }
             pass = self.counted(encoder, view, step.job, to, Part { is_first: false, is_last, keeps_stencil: false });
-            match step.then {
-                Then::Light { slot } => {
-                    pass.set_bind_group(0, self.views.group(slot), &[]);
-                    self.surfaces(&mut pass, &view.opaque, view.add_pass(false));
-                }
-                Then::Film { slot } => {
-                    pass.set_pipeline(&self.screen.film);
-                    pass.set_bind_group(1, self.films.group(slot), &[]);
-                    pass.draw(0..3, 0..1);
-                }
-            }
+            self.use_counts(&mut pass, view, &step.then);
         }
         pass.set_bind_group(0, self.views.group(view.blend_slot), &[]);
         self.surfaces(&mut pass, &view.blended, Pass::Blend);
@@ -141,12 +138,32 @@ impl Recorder<'_> {
         part: Part,
     ) -> wgpu::RenderPass<'e> {
         let mut pass = begin_view(encoder, self.clock, "shadow volumes", to, part);
-        let drawn = self.volumes.draw(&mut pass, job, self.views.group(view.base_slot), &view.sight);
+        self.count(&mut pass, view, job);
+        pass
+    }
+
+    /// Counts the volumes of a job, and forgets them where shapes receive no shadow.
+    fn count(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, job: usize) {
+        let drawn = self.volumes.draw(pass, job, self.views.group(view.base_slot), &view.sight);
         self.stats.volumes.add(&drawn);
         pass.set_stencil_reference(0);
         pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
-        self.surfaces(&mut pass, &view.exempt, Pass::Exempt);
-        pass
+        self.surfaces(pass, &view.exempt, Pass::Exempt);
+    }
+
+    /// Adds light outside of what was counted, or lays a film inside.
+    fn use_counts(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, then: &Then) {
+        match *then {
+            Then::Light { slot } => {
+                pass.set_bind_group(0, self.views.group(slot), &[]);
+                self.surfaces(pass, &view.opaque, view.add_pass(false));
+            }
+            Then::Film { slot } => {
+                pass.set_pipeline(&self.screen.film);
+                pass.set_bind_group(1, self.films.group(slot), &[]);
+                pass.draw(0..3, 0..1);
+            }
+        }
     }
 
     /// Light or film by the shadow texture that is made of the stencil, layer by layer. The pass that is left open is the

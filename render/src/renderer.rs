@@ -88,7 +88,8 @@ impl Renderer {
         self.take_drawables(scene);
         let lights = Lights::new(scene);
         self.choose_maps(scene, pictures);
-        let (mut jobs, purposes) = jobs::jobs(scene, &lights, &self.draws, &self.meshes, &self.deformer, &mut self.films);
+        let (mut jobs, purposes) =
+            jobs::jobs(scene, &lights, &self.draws, &self.meshes, &self.deformer, &mut self.films, &mut self.problems);
         let soft = soft::soft_jobs(scene, &lights, &purposes, &mut jobs);
         let plans =
             self.plan_views(pictures, &plan::Frame { scene, lights: &lights, purposes: &purposes, soft: &soft }, &mut stats);
@@ -206,6 +207,7 @@ impl Renderer {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         stats.deformed = self.deformer.run(&mut encoder, &self.clock);
         stats.volumes_made = self.volumes.prepare(device, &mut encoder, jobs);
+        self.volumes.problems().into_iter().for_each(|message| self.problems.report(message));
         let report = |message| self.problems.report(message);
         self.soft.prepare((device, queue), &mut encoder, &mut self.volumes, (jobs, soft), report);
         let drawer = Drawer {

@@ -310,14 +310,20 @@ fn lists_are_kept_and_renewed() {
     /// Name, casters, light, are the positions of `a` written, is more in shadow than by `b` alone; lists extracted,
     /// kept, left out.
     type Row<'a> = (&'static str, &'a [&'a Loaded], Vec4, bool, bool, [usize; 3]);
-    let rows: [Row<'_>; 8] = [
+    let turn = Mat4::from_rotation_translation(Quat::from_rotation_y(0.4), Vec3::new(0.1, 0.0, 0.05));
+    let turned = |l: &Loaded| Loaded { thing: l.thing.clone().under(turn), ..l.clone() };
+    let (a_turned, b_turned, lamp_turned) = (turned(&a), turned(&b), turn * lamp());
+    let rows: [Row<'_>; 11] = [
         ("a again beside b", &[&a, &b], sun(), false, true, [1, 1, 0]),
         ("nothing changed", &[&a, &b], sun(), false, true, [0, 2, 0]),
         ("order changed", &[&b, &a], sun(), false, true, [0, 2, 0]),
-        ("a moved away", &[&moved, &b], sun(), false, false, [1, 1, 0]),
-        ("a is back", &[&a, &b], sun(), false, true, [1, 1, 0]),
+        ("a moved away under parallel light", &[&moved, &b], sun(), false, false, [0, 2, 0]),
+        ("a is back", &[&a, &b], sun(), false, true, [0, 2, 0]),
         ("nothing to cast", &[&a, &empty, &b], sun(), false, true, [0, 2, 1]),
         ("another light", &[&a, &b], lamp(), false, true, [2, 0, 0]),
+        ("all turned as one", &[&a_turned, &b_turned], lamp_turned, false, true, [0, 2, 0]),
+        ("one turned, the light with it", &[&a_turned, &b], lamp_turned, false, true, [1, 1, 0]),
+        ("all back", &[&a, &b], lamp(), false, true, [1, 1, 0]),
         ("a deformed away", &[&deformed, &b], sun(), true, false, [2, 0, 0]),
     ];
     for (name, casters, toward_light, write, more, expected) in rows {

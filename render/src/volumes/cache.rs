@@ -13,6 +13,8 @@ pub(crate) struct GpuPart {
     pub(super) layers: u32,
     /// Are there surfaces that cast as they are wound, and such that cast turned over, before a matrix mirrors them?
     pub(super) windings: [bool; 2],
+    /// As in [`Part::is_convex`].
+    pub(super) is_convex: bool,
     /// Most triangles at one edge.
     pub(super) widest_edge: u32,
     pub(crate) triangles: wgpu::Buffer,
@@ -27,22 +29,21 @@ pub(crate) struct GpuPart {
 pub(super) struct MeshCache {
     // The weak pointer keeps the address from being used again.
     meshes: HashMap<*const Mesh, (Weak<Mesh>, Vec<Arc<GpuPart>>)>,
+    /// What was found wrong with meshes and not yet told.
+    pub(super) problems: Vec<String>,
 }
 
 impl MeshCache {
     /// The parts of a mesh; none where it has no triangle with an area of its own.
     pub(super) fn parts(&mut self, device: &wgpu::Device, mesh: &Arc<Mesh>) -> &[Arc<GpuPart>] {
+        let problems = &mut self.problems;
         let upload = || {
-            let limits = device.limits();
-            let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-            let (fit, too_large): (Vec<_>, Vec<_>) = parts::parts(mesh).into_iter().partition(|p| p.largest_list() <= limit);
-            if !too_large.is_empty() {
-                tracing::warn!(
-                    mesh = mesh.name,
-                    "mesh casts no shadow volume: its edges do not fit into a buffer of {limit} bytes"
-                );
+            let parts = parts::parts(mesh);
+            if let Some(problem) = problem_of(device, mesh, &parts) {
+                problems.push(format!("mesh '{}' {problem}", mesh.name));
             }
-            let parts = if too_large.is_empty() { fit } else { Vec::new() };
+            let fit = |p: &&Part| p.largest_list() <= largest_buffer(device);
+            let parts = if parts.iter().all(|p| fit(&p)) { parts } else { Vec::new() };
             (Arc::downgrade(mesh), parts.iter().map(|p| Arc::new(GpuPart::new(device, p))).collect())
         };
         &self.meshes.entry(Arc::as_ptr(mesh)).or_insert_with(upload).1
@@ -52,6 +53,28 @@ impl MeshCache {
     pub(super) fn forget_dead(&mut self) {
         self.meshes.retain(|_, (mesh, _)| mesh.strong_count() > 0);
     }
+}
+
+/// What the author of a mesh should know of its shadow volumes.
+fn problem_of(device: &wgpu::Device, mesh: &Mesh, parts: &[Part]) -> Option<String> {
+    let limit = largest_buffer(device);
+    let layers = parts.iter().map(|p| p.layers).max().unwrap_or(0);
+    if parts.is_empty() {
+        let count = mesh.triangle_count();
+        return Some(format!("casts no shadow volume: none of its {count} triangles has three places of its own"));
+    }
+    if parts.iter().any(|p| p.largest_list() > limit) {
+        return Some(format!("casts no shadow volume: its edges do not fit into a buffer of {limit} bytes"));
+    }
+    (layers > parts::STENCIL_LAYERS).then(|| {
+        format!("may put {layers} layers of shadow over a point: where they are a multiple of 128, its volume shadow has a hole")
+    })
+}
+
+/// Bytes of the largest list that the device can read.
+pub(super) fn largest_buffer(device: &wgpu::Device) -> u64 {
+    let limits = device.limits();
+    limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
 
 impl GpuPart {
@@ -66,6 +89,7 @@ impl GpuPart {
         let has = |winding: u32| part.triangles.iter().any(|t| t[3] == 0 || t[3] == winding);
         let edge_of: Vec<u32> = (0u32..).zip(&part.edges).flat_map(|(i, e)| std::iter::repeat_n(i, e[3] as usize)).collect();
         GpuPart {
+            is_convex: part.is_convex,
             windings: [has(1), has(2)],
             widest_edge: part.edges.iter().map(|e| e[3]).max().unwrap_or(0),
             edge_of: buffer("volume edges of incidences", bytemuck::cast_slice(&edge_of)),

@@ -12,7 +12,8 @@
 //! "not in front", so the two agree bit by bit, not just nearly.
 //!
 //! Caps. A near cap lies on the caster's own surface. It is never in front of what is seen if the surface itself was
-//! drawn into depth, so z-pass leaves it out there. A far cap at infinity is in front of nothing; z-pass needs none, and
+//! drawn into depth, so z-pass leaves it out there. Of surfaces drawn from their front alone this holds for convex solids:
+//! a ray that meets one from behind came in through its front. A far cap at infinity is in front of nothing; z-pass needs none, and
 //! under parallel light all of it is one point, so z-fail needs none either. A far cap short of infinity can be between N
 //! and P, unless a plane has N and every receiver on one side and the cap on the other ([`Reach::behind`]). Sides and
 //! caps outside of the frustum cover no pixel.
@@ -54,6 +55,8 @@ pub(super) struct Watch<'a> {
 pub(super) struct Choice {
     pub(super) z_fail: bool,
     pub(super) near_caps: bool,
+    /// Near caps of convex solids are left out.
+    pub(super) convex_hides: bool,
     pub(super) far_caps: bool,
     pub(super) scissor: Scissor,
 }
@@ -143,7 +146,7 @@ impl<'a> Watch<'a> {
     /// How a caster with these bounds is counted; `None` where the view shows nothing of its shadow.
     pub(super) fn choose(&self, bounds: &Aabb, surface: Surface, reach: &Reach) -> Option<Choice> {
         let sight = self.sight;
-        let all = Choice { z_fail: true, near_caps: true, far_caps: true, scissor: self.scissor? };
+        let all = Choice { z_fail: true, near_caps: true, convex_hides: false, far_caps: true, scissor: self.scissor? };
         if bounds.is_empty() {
             return Some(all);
         }
@@ -159,6 +162,7 @@ impl<'a> Watch<'a> {
         if is_safe {
             let is_in_front = |plane: DVec4| sight.near_rectangle.iter().all(|n| plane.dot(*n) > 0.0);
             choice.near_caps = surface != Surface::BothSides;
+            choice.convex_hides = surface == Surface::Front;
             choice.far_caps &= !reach.is_infinite() && !reach.behind.is_some_and(is_in_front);
         }
         if !self.light.settings.culling {

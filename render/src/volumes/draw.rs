@@ -177,7 +177,9 @@ impl Drawing {
         for (place, (lists, choice)) in shown.iter().enumerate() {
             let wanted = |piece| match piece {
                 Piece::Sides => true,
-                Piece::NearCaps | Piece::TurnedCaps => choice.near_caps && lists.has(piece),
+                Piece::NearCaps | Piece::TurnedCaps => {
+                    choice.near_caps && lists.has(piece) && !(choice.convex_hides && lists.part.is_convex)
+                }
                 Piece::FarCaps => choice.far_caps,
             };
             let kinds = Piece::ALL.into_iter().filter(|p| wanted(*p));

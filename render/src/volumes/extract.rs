@@ -2,7 +2,7 @@
 //! the edges that do not cancel.
 
 use super::VolumeLight;
-use super::cache::GpuPart;
+use super::cache::{GpuPart, largest_buffer};
 use super::draw::Layouts;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec4};
@@ -95,11 +95,51 @@ const DRAW_SIZE: u64 = size_of::<Draw>() as u64;
 const DRAWS_SIZE: u64 = 4 * DRAW_SIZE;
 
 /// Everything that decides what the lists hold.
-#[derive(Clone, PartialEq)]
+#[derive(Clone)]
 struct Key {
-    uniform: CasterUniform,
     positions: wgpu::Buffer,
     positions_revision: u64,
+    flags: u32,
+    world_from_object: Mat4,
+    toward_light: Vec4,
+    light_in_object: Option<Vec4>,
+}
+
+impl Key {
+    fn new(wanted: &Wanted<'_>, flags: u32) -> Key {
+        Key {
+            positions: wanted.positions.clone(),
+            positions_revision: wanted.positions_revision,
+            flags,
+            world_from_object: wanted.world_from_object,
+            toward_light: wanted.light.toward_light,
+            light_in_object: light_in_object(&wanted.world_from_object, wanted.light.toward_light),
+        }
+    }
+
+    /// Do lists made for `self` serve `other`? Which triangles face the light is decided by where it is as the object sees
+    /// it, so a world that turns and moves as one keeps its lists, "the world moves" of an installation among it. Whatever
+    /// triangles are taken to face the light, their volumes are closed, so a rounding error of the matrices moves a
+    /// shadow's edge at most from one end of a triangle that the light grazes to the other.
+    fn serves(&self, other: &Key) -> bool {
+        let same =
+            self.positions == other.positions && self.positions_revision == other.positions_revision && self.flags == other.flags;
+        let (place, other_place) = ((self.world_from_object, self.toward_light), (other.world_from_object, other.toward_light));
+        let near = |(a, b): (Vec4, Vec4)| a.w == b.w && (a - b).length() <= 3e-6 * a.length();
+        same && (place == other_place || self.light_in_object.zip(other.light_in_object).is_some_and(near))
+    }
+}
+
+/// Where an object sees the light: a position (w = 1) or a unit vector (w = 0); `None` where the matrix flattens it.
+fn light_in_object(world_from_object: &Mat4, toward_light: Vec4) -> Option<Vec4> {
+    let m = world_from_object.as_dmat4();
+    let size = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
+    if m.determinant().abs() <= 1e-6 * size {
+        return None;
+    }
+    let light = m.inverse() * toward_light.as_dvec4();
+    let light = if toward_light.w == 0.0 { light.normalize() } else { light };
+    Some(light.as_vec4().truncate().extend(toward_light.w))
 }
 
 /// The volume of one part of a caster under one light.
@@ -251,13 +291,12 @@ impl Extract {
     pub(super) fn lists(&self, device: &wgpu::Device, wanted: &Wanted<'_>, old: Option<Lists>) -> Option<(Lists, Stale)> {
         let uniform = CasterUniform::new(wanted.light, wanted.world_from_object, wanted.bounds_in_world, wanted.part);
         let content = CasterUniform { reach_w: wanted.reach_w, ..uniform };
-        // How far vertices are thrown is nothing to the lists.
-        let key = Key { uniform, positions: wanted.positions.clone(), positions_revision: wanted.positions_revision };
+        let key = Key::new(wanted, content.flags);
         let is_listed = wanted.light.settings.silhouettes == Silhouettes::Compute || wanted.part.widest_edge > WIDEST_EDGE;
         let caster = wanted.caster;
         Some(match old.filter(|o| o.listed.is_some() == is_listed) {
-            Some(old) if old.key == key && old.content == content => (Lists { caster, ..old }, Stale::No),
-            Some(old) if old.key == key => (Lists { caster, content, ..old }, Stale::Uniform),
+            Some(old) if old.key.serves(&key) && old.content == content => (Lists { caster, ..old }, Stale::No),
+            Some(old) if old.key.serves(&key) => (Lists { caster, content, ..old }, Stale::Uniform),
             Some(old) if old.key.positions == key.positions => (Lists { caster, content, key, ..old }, Stale::Lists),
             old => {
                 let (uniform, listed) = match old {
@@ -314,9 +353,8 @@ fn allocate(
     let buffer = |label, size, usage| {
         device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
     };
-    let limits = device.limits();
     let capacity = Capacity::new(part);
-    if is_listed && capacity.bytes() > limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) {
+    if is_listed && capacity.bytes() > largest_buffer(device) {
         return None;
     }
     let listed = is_listed.then(|| {

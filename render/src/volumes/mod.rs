@@ -22,6 +22,7 @@ mod choose;
 mod draw;
 mod extract;
 mod hull;
+mod layers;
 mod parts;
 mod reach;
 
@@ -91,7 +92,9 @@ pub struct VolumeCaster {
 pub enum Surface {
     /// All of it, from both sides.
     BothSides,
-    /// Not all: it is half-transparent, has holes, or is not drawn from behind.
+    /// All of it, from the side that its triangles are wound for, and no vertex is deformed.
+    Front,
+    /// Not all: it is half-transparent, has holes, or is deformed and not drawn from behind.
     #[default]
     InParts,
 }
@@ -169,7 +172,7 @@ impl VolumePass {
     /// their place in `jobs`.
     pub fn prepare(&mut self, device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder, jobs: &[VolumeJob]) -> VolumeStats {
         let mut stats = VolumeStats::default();
-        let mut stale = Vec::new();
+        let (mut stale, mut too_large) = (Vec::new(), Vec::new());
         let mut old_jobs = std::mem::take(&mut self.jobs).into_iter();
         for (j, job) in jobs.iter().enumerate() {
             let mut old = OldLists::new(old_jobs.next().unwrap_or_default().lists);
@@ -198,6 +201,8 @@ impl VolumePass {
                     stats.may_wrap += usize::from(part.layers > parts::STENCIL_LAYERS);
                     let Some((made, is_stale)) = self.extract.lists(device, &wanted, old.take(part)) else {
                         stats.left_out += 1;
+                        let name = &caster.mesh.name;
+                        too_large.push(format!("mesh '{name}' casts no shadow volume: the device cannot hold its sides"));
                         continue;
                     };
                     match is_stale {
@@ -217,12 +222,18 @@ impl VolumePass {
         let stale: Vec<_> = stale.into_iter().map(|(job, place, stale)| (&self.jobs[job].lists[place], stale)).collect();
         self.extract.run(device, encoder, &stale);
         self.meshes.forget_dead();
+        self.meshes.problems.append(&mut too_large);
         stats
     }
 
     /// What of a mesh casts, part by part.
     pub(crate) fn parts(&mut self, device: &wgpu::Device, mesh: &Arc<Mesh>) -> &[Arc<GpuPart>] {
         self.meshes.parts(device, mesh)
+    }
+
+    /// What was wrong with casters since the last call.
+    pub fn problems(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.meshes.problems)
     }
 
     /// Counts the volumes of a job into the stencil, which must be 0 in the viewport; afterwards it is 0 where the light

@@ -1,5 +1,6 @@
 //! What of a mesh casts: connected surfaces, how they are wound, and how many layers of shadow they may put over a point.
 
+use super::layers::{self, Deep};
 use umbriel_scene::{Edges, Mesh};
 
 /// Layers that one stencil group may hold where the eighth bit keeps what groups before it shadowed.
@@ -8,6 +9,8 @@ pub(super) const GROUP_LAYERS: u32 = 127;
 pub(super) const STENCIL_LAYERS: u32 = 255;
 /// A mesh of very many loose pieces is not cut further than this.
 const MAX_PARTS: usize = 8;
+/// Only surfaces of more faces can be a stack of so many layers that these are counted.
+const DEEP_SURFACE_FACES: u32 = 2 * GROUP_LAYERS;
 /// Layers set aside for one connected surface that is not convex.
 const BENT_SURFACE_LAYERS: u32 = 8;
 
@@ -22,6 +25,8 @@ pub(super) struct Part {
     pub(super) incidences: Vec<u32>,
     /// Layers it may put over a point.
     pub(super) layers: u32,
+    /// Every surface is a convex solid wound outward.
+    pub(super) is_convex: bool,
 }
 
 impl Part {
@@ -40,13 +45,14 @@ pub(super) fn parts(mesh: &Mesh) -> Vec<Part> {
     let (surface_of, count) = connected(mesh.triangle_count(), &edges);
     let surfaces = surfaces(mesh, &edges, &surface_of, count);
     let (part_of, layers) = distribute(surfaces.iter().map(|s| s.layers));
-    let mut parts: Vec<Part> = layers.iter().map(|&layers| Part { layers, ..Part::default() }).collect();
+    let mut parts: Vec<Part> = layers.iter().map(|&layers| Part { layers, is_convex: true, ..Part::default() }).collect();
     let mut place = vec![0; surface_of.len()];
     for (t, &surface) in (0u32..).zip(&surface_of).filter(|(_, s)| **s != NONE) {
         let part = &mut parts[part_of[surface as usize]];
         place[t as usize] = part.triangles.len() as u32;
         let [a, b, c] = triangle(t);
         part.triangles.push([a, b, c, surfaces[surface as usize].winding]);
+        part.is_convex &= surfaces[surface as usize].is_convex;
     }
     for edge in &edges.edges {
         let incidences = &edges.incidences[edge.first as usize..][..edge.count as usize];
@@ -67,6 +73,8 @@ struct Surface {
     winding: u32,
     /// As in [`Part::layers`].
     layers: u32,
+    /// A convex solid wound outward.
+    is_convex: bool,
 }
 
 /// The surface of each triangle, in the order of their first triangles, and their number.
@@ -163,9 +171,20 @@ fn surfaces(mesh: &Mesh, edges: &Edges, surface_of: &[u32], count: usize) -> Vec
                 2
             },
             layers: if convex { 1 } else { s.faces.min(BENT_SURFACE_LAYERS) },
+            is_convex: convex && s.volume > 0.0,
         }
     };
-    sums.into_iter().map(finish).collect()
+    let mut surfaces: Vec<Surface> = sums.iter().copied().map(finish).collect();
+    let deep =
+        (0u32..).zip(surfaces.iter().zip(&sums)).filter(|(_, (surface, s))| surface.layers > 1 && s.faces > DEEP_SURFACE_FACES);
+    let deep: Vec<Deep> = deep.map(|(i, (surface, _))| Deep { surface: i, is_closed: surface.winding != 0 }).collect();
+    if !deep.is_empty() {
+        for (deep, layers) in deep.iter().zip(layers::counted(mesh, surface_of, &deep)) {
+            let surface = &mut surfaces[deep.surface as usize];
+            surface.layers = surface.layers.max(layers);
+        }
+    }
+    surfaces
 }
 
 /// Part of each surface, and the layers of each part. Beyond [`MAX_PARTS`] it is one part again, with all layers.
@@ -203,6 +222,22 @@ mod tests {
             positions: (0..count).flat_map(corner).collect(),
             indices: (0..count as u32).flat_map(|n| indices.iter().map(move |i| 8 * n + i)).collect(),
             ..Mesh::default()
+        }
+    }
+
+    /// A strip folded to and fro lies over itself as often as it has folds.
+    #[test]
+    fn layers_of_one_surface_are_counted() {
+        for folds in [100u32, 200, 400] {
+            let at = |i: u32| [Vec3::new((i % 2) as f32, 0.01 * i as f32, 0.0), Vec3::new((i % 2) as f32, 0.01 * i as f32, 1.0)];
+            let mesh = Mesh {
+                positions: (0..=folds).flat_map(at).collect(),
+                indices: (0..folds).flat_map(|i| [0, 1, 2, 2, 1, 3].map(|k| 2 * i + k)).collect(),
+                ..Mesh::default()
+            };
+            let layers: Vec<u32> = parts(&mesh).iter().map(|p| p.layers).collect();
+            let expected = if 2 * folds > DEEP_SURFACE_FACES { folds } else { BENT_SURFACE_LAYERS };
+            assert_eq!(layers, [expected], "{folds} folds");
         }
     }
 

@@ -182,6 +182,8 @@ fn stencil_groups_and_methods_work_together() {
         ("additive group of a mapped light", vec![with(Map)], vec![group(0, vec![1], StencilMode::Additive)], [0.0; 3]),
         ("film", vec![with(None)], vec![group(0, vec![1], film)], [0.375, 0.375, 0.625]),
         ("two films of a caster", vec![with(None)], vec![group(0, vec![1, 1], film)], [0.375, 0.375, 0.625]),
+        ("film of a light with a map", vec![with(Map)], vec![group(0, vec![1], film)], [0.0; 3]),
+        ("film of a light with volumes", vec![with(Volume)], vec![group(0, vec![1], film)], [0.0; 3]),
         ("volume and another light", vec![with(Volume), side.clone()], vec![], [slanted; 3]),
         ("map and volume", vec![with(Map), with(Volume)], vec![], [0.0; 3]),
         ("two volumes", vec![with(Volume), Light { shadows: Volume, ..side.clone() }], vec![], [slanted; 3]),
@@ -190,7 +192,9 @@ fn stencil_groups_and_methods_work_together() {
     for (name, lights, stencil_groups, colour) in rows {
         let scene = Scene { lights, stencil_groups, ..ball_over_floor(light.clone()) };
         let shot = shoot(&scene, &look_down());
-        assert_eq!(shot.problems, Vec::<String>::new(), "{name}");
+        // A film on top of another shadow of the same light would darken twice: it is left out, and told.
+        let told = shot.problems.iter().filter(|p| p.contains("nothing is darkened twice")).count();
+        assert_eq!((told, shot.problems.len()), if name.starts_with("film of a light with") { (1, 1) } else { (0, 0) }, "{name}");
         assert_colour(shot.centre(), colour, name);
     }
 }
