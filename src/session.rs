@@ -236,12 +236,22 @@ impl Session {
         }
     }
 
+    /// Files changed. Shaders are read again and the world goes on; any other file means to begin anew.
+    pub(crate) fn files_changed(&mut self, files: &[PathBuf]) {
+        let shaders: Vec<PathBuf> = self.extractor.shader_files().map(Path::to_path_buf).collect();
+        self.extractor.forget_shaders(files);
+        if files.iter().any(|file| !shaders.contains(file)) {
+            self.reload();
+        }
+    }
+
     /// The files that were read.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         let mut files = vec![self.path.clone()];
         if let Source::World(world) = &self.source {
             files.extend(world.files().map(Path::to_path_buf).filter(|f| *f != self.path));
         }
+        files.extend(self.extractor.shader_files().map(Path::to_path_buf));
         files
     }
 

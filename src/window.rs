@@ -101,7 +101,7 @@ impl App for Viewer {
 
     fn files_changed(&mut self, files: &[PathBuf]) {
         tracing::info!("changed: {files:?}");
-        self.session.reload();
+        self.session.files_changed(files);
         self.tell();
     }
 

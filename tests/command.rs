@@ -36,7 +36,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
     let truncated = folder("command").join("truncated.glb");
     std::fs::write(&truncated, b"glTF\x02\0\0\0\xff\0\0\0").expect("a file can be written");
     // Name, line of the world, what the message must contain. The rest of the world is drawn.
-    let rows: [(&str, &str, &[&str]); 13] = [
+    let rows: [(&str, &str, &[&str]); 16] = [
         (
             "negative_soft_range",
             r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "volume", soft: "range", soft_range: -1.0 }));"#,
@@ -71,6 +71,21 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
             "missing_texture",
             r#"world.add(shape(make("Box"), make("PhysicalMaterial", #{ base_texture: make("ImageTexture", #{ url: "no.png" }) })));"#,
             &["missing_texture.rhai:4", "no.png"],
+        ),
+        (
+            "missing_shader",
+            r#"world.add(shape(make("Box"), appearance(#{ shader: shader("no.wgsl", #{}) })));"#,
+            &["missing_shader.rhai:4", "no.wgsl", "url"],
+        ),
+        (
+            "wrong_shader",
+            r#"world.add(shape(make("Box"), appearance(#{ shader: make("FragmentShader", #{ name: "toon", source: "\nfn shade() {}" }) })));"#,
+            &["FragmentShader 'toon', source:2:1: it must be `fn shade(s: Surface, light: LightSample) -> vec3<f32>`"],
+        ),
+        (
+            "endless_number",
+            r#"let s = make("FragmentShader", #{ name: "toon", source: "fn surface(s: Surface) -> Surface { return s; }" }); s.add_field("bands", 1.0 / 0.0); world.add(shape(make("Box"), appearance(#{ shader: s })));"#,
+            &["endless_number.rhai:4", "toon", "`bands` is not finite"],
         ),
         (
             "lightless_stencil",

@@ -13,6 +13,8 @@ pub(crate) struct Kind {
     pub(crate) topology: u8,
     pub(crate) mirrored: bool,
     pub(crate) double_sided: bool,
+    /// Of the author; see [`crate::author`].
+    pub(crate) shader: u32,
 }
 
 /// What alpha means, without its numbers.
@@ -96,7 +98,7 @@ const NOTHING: u32 = u32::MAX;
 impl Draws {
     /// Starts a frame with room for `count` drawables.
     pub(crate) fn begin(&mut self, count: usize) {
-        let kind = Kind { alpha: Alpha::Opaque, topology: 0, mirrored: false, double_sided: false };
+        let kind = Kind { alpha: Alpha::Opaque, topology: 0, mirrored: false, double_sided: false, shader: 0 };
         let slot = Slot { mesh: NOTHING, material: NOTHING, kind, deformed: None, drawn: false, casts: false };
         if self.slots.len() != count {
             self.is_sorted = false;
@@ -154,6 +156,7 @@ impl Draws {
             },
             mirrored: instance.flags & Instance::MIRRORED != 0,
             double_sided: gpu_material.double_sided,
+            shader: gpu_material.shader,
         };
         let same = slot.drawn && (slot.mesh, slot.material, slot.deformed, slot.kind) == (mesh, material, deformed, kind);
         self.is_sorted &= same;

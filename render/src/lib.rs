@@ -6,6 +6,7 @@
 //!
 //! This crate knows nothing of the field graph, of files, scripts, windows, trackers or sockets.
 
+mod author;
 mod buffer;
 mod cache;
 mod clock;

@@ -104,5 +104,6 @@ fn frame_of(scene: &Scene, light_count: usize) -> uniforms::Frame {
         fog_kind: u32::from(fog.is_some_and(|f| f.kind == FogKind::Exponential)),
         light_count: light_count as u32,
         spare: [0; 2],
+        world_from_room: scene.world_from_room.to_cols_array_2d(),
     }
 }

@@ -30,6 +30,8 @@ pub(crate) struct ViewPlan {
     pub(crate) exempt: Vec<Draw>,
     /// What shadow volumes are chosen by.
     pub(crate) sight: Sight,
+    /// Those of the opaque shapes whose own shader makes something of a light's shadow.
+    pub(crate) shading_shadow: Vec<Draw>,
     /// Shadow volumes and what is done with each.
     pub(crate) steps: Vec<Step>,
 }
@@ -192,6 +194,7 @@ pub(crate) fn plan_picture(
             blended,
             exempt,
             sight,
+            shading_shadow: Vec::new(),
             steps,
         });
     }

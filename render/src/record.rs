@@ -157,6 +157,7 @@ impl Recorder<'_> {
             Then::Light { slot } => {
                 pass.set_bind_group(0, self.views.group(slot), &[]);
                 self.surfaces(pass, &view.opaque, view.add_pass(false));
+                self.surfaces(pass, &view.shading_shadow, Pass::AddInShadow);
             }
             Then::Film { slot } => {
                 pass.set_pipeline(&self.screen.film);

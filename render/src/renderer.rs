@@ -3,7 +3,7 @@
 use crate::cache::{GpuMaterial, GpuMesh, MaterialCache, Slab, make_mesh};
 use crate::clock::Clock;
 use crate::deform::Deformer;
-use crate::draws::{Caches, Draws};
+use crate::draws::{Caches, Draw, Draws};
 use crate::layouts::Layouts;
 use crate::lighting::Lighting;
 use crate::lights::Lights;
@@ -130,9 +130,13 @@ impl Renderer {
                 }
             });
             let material = self.materials.get_or_make(&d.material, hint.1, frame, || {
+                let shader = self.surface.shader_of(device, &d.material, frame, |message| problems.report(message));
                 let report = |message| problems.report(message);
-                self.material_cache.make(device, queue, &self.layouts.material, &d.material, report)
+                self.material_cache.make(device, queue, &self.layouts.material, &d.material, shader, report)
             });
+            if let Some(made) = self.materials.get(material) {
+                self.surface.touch(made.shader, frame);
+            }
             let deformed = match (&d.pose, self.meshes.get(mesh)) {
                 (Some(pose), Some(Some(gpu_mesh))) => {
                     self.deformer.pose(device, index as u32, &d.mesh, gpu_mesh, pose, frame).then_some(index as u32)
@@ -175,12 +179,16 @@ impl Renderer {
             let (draws, views, problems) = (&mut self.draws, &mut self.views, &mut self.problems);
             plans.extend(plan::plan_picture(number, picture, frame, draws, views, problems, stats, limit));
         }
-        for view in &plans {
+        for view in &mut plans {
+            if !view.is_visibility && !view.steps.is_empty() {
+                let shader = |d: &&Draw| self.draws.batches[d.batch as usize].kind.shader;
+                view.shading_shadow = view.opaque.iter().filter(|d| self.surface.shades_shadow(shader(d))).copied().collect();
+            }
             let is_soft = view.steps.iter().any(|s| s.soft.is_some());
             self.view_targets.make(device, &self.layouts.picture, view.size, is_soft, self.frame);
             let mut passes = vec![(view.base_pass(), &view.opaque), (Pass::Blend, &view.blended)];
             if !view.steps.is_empty() {
-                passes.push((Pass::Exempt, &view.exempt));
+                passes.extend([(Pass::Exempt, &view.exempt), (Pass::AddInShadow, &view.shading_shadow)]);
                 passes.extend(view.steps.iter().map(|s| (view.add_pass(s.soft.is_some()), &view.opaque)));
             }
             for (pass, list) in passes {
@@ -249,6 +257,7 @@ impl Renderer {
         self.meshes.drop_unused(self.frame);
         self.materials.drop_unused(self.frame);
         self.material_cache.drop_unused();
+        self.surface.drop_unused(self.frame);
         self.deformer.drop_unused(self.frame);
         self.view_targets.drop_unused(self.frame);
     }

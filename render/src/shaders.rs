@@ -1,9 +1,8 @@
 //! The shaders: each is a pass's own WGSL behind the snippets that it uses.
 
-/// Name and parts of every shader.
+/// Name and parts of every shader but that of surfaces.
 #[cfg(test)]
 pub(crate) const ALL: &[(&str, &[&str])] = &[
-    ("surface", SURFACE),
     ("background", BACKGROUND),
     ("film", FILM),
     ("compose", COMPOSE),
@@ -16,17 +15,28 @@ pub(crate) const ALL: &[(&str, &[&str])] = &[
     ("soft film", SOFT_FILM),
 ];
 
-pub(crate) const SURFACE: &[&str] = &[
+/// All that surfaces use, but the functions that a shape's own shader may replace ([`HOOKS`]) and what calls them.
+pub(crate) const SURFACE_BEFORE_HOOKS: &[&str] = &[
     include_str!("shaders/position.wgsl"),
     include_str!("shaders/view.wgsl"),
     include_str!("shaders/instance.wgsl"),
     include_str!("shaders/material.wgsl"),
     include_str!("shaders/light.wgsl"),
+    include_str!("shaders/shade.wgsl"),
     include_str!("shaders/brdf.wgsl"),
     include_str!("shaders/shadow_map.wgsl"),
     include_str!("shaders/soft_shadow.wgsl"),
-    include_str!("surface.wgsl"),
 ];
+
+/// What a shape's own shader may replace; see [`crate::author`].
+pub(crate) const HOOKS: &str = include_str!("shaders/hooks.wgsl");
+
+pub(crate) const SURFACE_BEHIND_HOOKS: &str = include_str!("surface.wgsl");
+
+/// The shader of surfaces that bring none of their own.
+pub(crate) fn surface() -> String {
+    [&SURFACE_BEFORE_HOOKS.concat(), &crate::author::standard_hooks(), SURFACE_BEHIND_HOOKS].concat()
+}
 
 pub(crate) const BACKGROUND: &[&str] = &[
     include_str!("shaders/view.wgsl"),
@@ -91,18 +101,22 @@ mod tests {
     use naga::valid::{Capabilities, ValidationFlags, Validator};
     use std::mem::offset_of;
 
-    fn parsed(name: &str, parts: &[&str]) -> naga::Module {
-        let source = parts.concat();
-        let module = naga::front::wgsl::parse_str(&source).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&source)));
+    fn parsed(name: &str, source: &str) -> naga::Module {
+        let module = naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(source)));
         let valid = Validator::new(ValidationFlags::all(), Capabilities::all()).validate(&module);
-        valid.unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&source)));
+        valid.unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(source)));
         module
+    }
+
+    fn all() -> Vec<(&'static str, String)> {
+        let others = ALL.iter().map(|(name, parts)| (*name, parts.concat()));
+        others.chain([("surface", surface())]).collect()
     }
 
     #[test]
     fn all_are_valid() {
-        for (name, parts) in ALL {
-            assert!(!parsed(name, parts).entry_points.is_empty(), "{name}");
+        for (name, source) in all() {
+            assert!(!parsed(name, &source).entry_points.is_empty(), "{name}");
         }
     }
 
@@ -123,17 +137,18 @@ mod tests {
             ours!("surface", "Instance", uniforms::Instance, world_from_object world_from_object_normal flags),
             ours!("surface", "Texture", uniforms::Texture, linear offset uv_set present),
             ours!("surface", "Material", uniforms::Material, base_color emissive alpha_cutoff specular exponent metallic
-                roughness normal_scale occlusion_strength ambient shading alpha_mode textures),
+                roughness normal_scale occlusion_strength ambient shading alpha_mode textures params),
             ours!("surface", "Light", uniforms::Light, position kind direction range color shadow_intensity ambient cos_outer
                 attenuation cone_scale first_face face_count filter_width slope_bias constant_bias map_flags size),
             ours!("surface", "MapFace", uniforms::MapFace, map_from_world world_from_map tile light texel depth),
-            ours!("surface", "Frame", uniforms::Frame, ambient zenith horizon nadir fog_color fog_range fog_kind light_count),
+            ours!("surface", "Frame", uniforms::Frame, ambient zenith horizon nadir fog_color fog_range fog_kind light_count
+                world_from_room),
             ours!("film", "Film", uniforms::Film, color),
             ours!("penumbra", "Source", soft::Source, toward_light size),
             ours!("deform", "Deformation", deform::Uniform, vertex_count target_count joint_count),
         ] {
-            let (_, parts) = ALL.iter().find(|(n, _)| *n == shader).unwrap();
-            let module = parsed(shader, parts);
+            let (_, source) = all().into_iter().find(|(n, _)| *n == shader).unwrap();
+            let module = parsed(shader, &source);
             let (_, theirs) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
             let naga::TypeInner::Struct { members, span } = &theirs.inner else { panic!("{name} is no struct") };
             let members: Vec<_> = members.iter().map(|m| (m.name.clone().unwrap(), m.offset as usize)).collect();

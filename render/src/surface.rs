@@ -1,11 +1,13 @@
 //! Pipelines of surfaces.
 
+use crate::author::{Authors, STANDARD};
 use crate::cache::VERTEX_BUFFERS;
 use crate::draws::{Alpha, Kind};
 use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT, SAMPLES};
 use crate::layouts::Layouts;
 use crate::shaders;
 use std::collections::HashMap;
+use umbriel_scene::Material;
 
 /// What a pass over the surfaces does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -18,6 +20,8 @@ pub(crate) enum Pass {
     Add,
     /// One light as far as its shadow texture shows it.
     AddSoft,
+    /// One light where the stencil is not 0, for shapes that make something of the shadow.
+    AddInShadow,
     /// Depth, and what a map lets through of one light.
     Visibility,
     /// The same where the stencil is 0.
@@ -28,12 +32,23 @@ pub(crate) enum Pass {
     Exempt,
 }
 
+impl Pass {
+    /// What of a kind matters: shaders of authors shade, and only that.
+    fn seen(self, kind: Kind) -> Kind {
+        match self {
+            Pass::Base | Pass::Blend | Pass::Add | Pass::AddSoft | Pass::AddInShadow => kind,
+            Pass::Visibility | Pass::VisibilityAdd | Pass::VisibilitySoft | Pass::Exempt => Kind { shader: STANDARD, ..kind },
+        }
+    }
+}
+
 /// Pipelines by pass and kind of drawable.
 pub(crate) struct Surface {
     module: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
     /// With the shadow texture beside the view.
     soft_layout: wgpu::PipelineLayout,
+    authors: Authors,
     pipelines: HashMap<(Pass, Kind), wgpu::RenderPipeline>,
 }
 
@@ -47,20 +62,45 @@ impl Surface {
             })
         };
         let (layout, soft_layout) = (layout(&layouts.view), layout(&layouts.soft_view));
-        let module = shaders::module(device, "surface", shaders::SURFACE);
-        Surface { module, layout, soft_layout, pipelines: HashMap::new() }
+        let module = shaders::module(device, "surface", &[&shaders::surface()]);
+        Surface { module, layout, soft_layout, authors: Authors::default(), pipelines: HashMap::new() }
     }
 
     /// Makes the pipeline where there is none yet.
     pub(crate) fn make(&mut self, device: &wgpu::Device, pass: Pass, kind: Kind) {
+        let kind = pass.seen(kind);
+        let module = self.authors.get(kind.shader).map_or(&self.module, |author| &author.module);
         let is_soft = matches!(pass, Pass::AddSoft | Pass::VisibilitySoft);
         let layout = if is_soft { &self.soft_layout } else { &self.layout };
-        let make = || pipeline(device, &self.module, layout, pass, kind);
+        let make = || pipeline(device, module, layout, pass, kind);
         self.pipelines.entry((pass, kind)).or_insert_with(make);
     }
 
     pub(crate) fn get(&self, pass: Pass, kind: Kind) -> Option<&wgpu::RenderPipeline> {
-        self.pipelines.get(&(pass, kind))
+        self.pipelines.get(&(pass, pass.seen(kind)))
+    }
+
+    /// Number of the shader that an author wrote for a material.
+    pub(crate) fn shader_of(&mut self, device: &wgpu::Device, of: &Material, frame: u64, report: impl FnOnce(String)) -> u32 {
+        self.authors.number_of(device, of, frame, report)
+    }
+
+    /// A shader is drawn with.
+    pub(crate) fn touch(&mut self, shader: u32, frame: u64) {
+        self.authors.touch(shader, frame);
+    }
+
+    /// Does a shader make something of a light's shadow?
+    pub(crate) fn shades_shadow(&self, shader: u32) -> bool {
+        self.authors.get(shader).is_some_and(|author| author.shades)
+    }
+
+    /// Forgets shaders that nothing is drawn with.
+    pub(crate) fn drop_unused(&mut self, frame: u64) {
+        let gone = self.authors.drop_unused(frame);
+        if !gone.is_empty() {
+            self.pipelines.retain(|(_, kind), _| !gone.contains(&kind.shader));
+        }
     }
 }
 
@@ -87,11 +127,15 @@ fn pipeline(
         (Pass::Add, _) => "added",
         (Pass::AddSoft, _) => "added_soft",
         (Pass::VisibilitySoft, _) => "visibility_soft",
+        (Pass::AddInShadow, _) => "added_in_shadow",
         (Pass::Visibility | Pass::VisibilityAdd, _) => "visibility",
         (Pass::Exempt, _) => "nothing",
     };
     let fills_depth = matches!(pass, Pass::Base | Pass::Visibility);
-    let adds = matches!(pass, Pass::Add | Pass::VisibilityAdd | Pass::AddSoft | Pass::VisibilitySoft);
+    let adds = matches!(
+        pass,
+        Pass::Add | Pass::AddInShadow | Pass::VisibilityAdd | Pass::AddSoft | Pass::VisibilitySoft
+    );
     let depth_compare = if adds || pass == Pass::Exempt { wgpu::CompareFunction::Equal } else { wgpu::CompareFunction::Greater };
     let sum = |dst_factor| wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,
@@ -101,13 +145,14 @@ fn pipeline(
     let blend = match pass {
         Pass::Base | Pass::Visibility | Pass::Exempt => None,
         Pass::Blend => Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-        Pass::Add | Pass::VisibilityAdd | Pass::AddSoft | Pass::VisibilitySoft => {
+        Pass::Add | Pass::AddInShadow | Pass::VisibilityAdd | Pass::AddSoft | Pass::VisibilitySoft => {
             Some(wgpu::BlendState { color: sum(wgpu::BlendFactor::One), alpha: sum(wgpu::BlendFactor::One) })
         }
     };
     let stencil = match pass {
         Pass::Exempt => without_shadow(),
-        Pass::Add | Pass::VisibilityAdd => outside_shadow(),
+        Pass::Add | Pass::VisibilityAdd => where_volumes(wgpu::CompareFunction::Equal),
+        Pass::AddInShadow => where_volumes(wgpu::CompareFunction::NotEqual),
         _ => wgpu::StencilState::default(),
     };
     let write_mask = if pass == Pass::Exempt { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
@@ -146,9 +191,9 @@ fn pipeline(
     })
 }
 
-/// Passes where no volume was counted.
-fn outside_shadow() -> wgpu::StencilState {
-    let face = wgpu::StencilFaceState { compare: wgpu::CompareFunction::Equal, ..wgpu::StencilFaceState::IGNORE };
+/// Passes where the number of volumes compares to 0.
+fn where_volumes(compare: wgpu::CompareFunction) -> wgpu::StencilState {
+    let face = wgpu::StencilFaceState { compare, ..wgpu::StencilFaceState::IGNORE };
     wgpu::StencilState { front: face, back: face, read_mask: 0xff, write_mask: 0 }
 }
 

@@ -1,4 +1,5 @@
-// Surfaces as the eye sees them. Concatenated after shaders/{position,view,instance,material,light,brdf,shadow_map}.
+// Surfaces as the eye sees them. Concatenated after shaders/{position,view,instance,material,light,shade,brdf,
+// shadow_map}, and the functions that a shape's own shader may replace (`author/`).
 
 struct Vertex {
     @location(0) position: vec3<f32>,
@@ -39,25 +40,10 @@ fn vertex(v: Vertex) -> Fragment {
     return f;
 }
 
-// What all variants need to know about the place. Called in uniform control flow: it takes derivatives.
-struct Place {
-    base_color: vec4<f32>,
-    normal: vec3<f32>,
-    // Unit normal of the triangle, towards the eye.
-    face_normal: vec3<f32>,
-    towards_eye: vec3<f32>,
-    distance: f32,
-    emissive: vec3<f32>,
-    occlusion: f32,
-    metallic: f32,
-    roughness: f32,
-    // Lines and points without normals.
-    is_unlit: bool,
-    is_receiver: bool,
-};
-
-fn place(f: Fragment) -> Place {
-    var s: Place;
+// What all variants need to know. Called in uniform control flow: it takes derivatives.
+fn place(f: Fragment) -> Surface {
+    load_params();
+    var s: Surface;
     s.base_color = base_color_at(f.uv0, f.uv1, f.color);
     s.emissive = material.emissive;
     if material.textures[4].present != 0u {
@@ -75,6 +61,11 @@ fn place(f: Fragment) -> Place {
         s.metallic *= m.b;
         s.roughness *= m.g;
     }
+    s.position = f.p_in_world;
+    s.uv0 = f.uv0;
+    s.uv1 = f.uv1;
+    s.vertex_color = f.color;
+    s.pixel = f.clip.xy;
     let to_eye = view.eye_in_world.xyz - f.p_in_world;
     s.distance = length(to_eye);
     s.towards_eye = to_eye / max(s.distance, 1e-9);
@@ -98,8 +89,8 @@ fn place(f: Fragment) -> Place {
         n = bumped(f, n, across, down);
     }
     s.normal = side * n;
-    s.is_receiver = (f.flags & RECEIVES_SHADOW) != 0u;
-    return s;
+    s.receives_shadow = (f.flags & RECEIVES_SHADOW) != 0u;
+    return surface(s);
 }
 
 // Normal from the normal texture; where the mesh has no tangents they follow from the texture coordinates
@@ -130,59 +121,57 @@ fn bumped(f: Fragment, n: vec3<f32>, across: vec3<f32>, down: vec3<f32>) -> vec3
     return normalize(t * m.x + b * m.y + n * m.z);
 }
 
-// Light of the view's range of lights that the place reflects towards the eye.
-fn reflected(f: Fragment, s: Place) -> vec3<f32> {
+// Light of the view's range of lights that the place reflects towards the eye. `shadow` is the share of it that other means
+// than maps let through.
+fn reflected(s: Surface, shadow: f32) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
-    let roughness = clamp(s.roughness, 0.0, 1.0);
-    let surface = Surface(s.normal, s.towards_eye, s.base_color.rgb, saturate(s.metallic), max(roughness * roughness, 0.002));
     for (var i = 0u; i < view.light_count; i++) {
         let light = lights[view.first_light + i];
-        let in_ = incidence(light, f.p_in_world);
+        let in_ = incidence(light, s.position);
         if in_.strength <= 0.0 {
             continue;
         }
-        var brdf: vec3<f32>;
-        if material.shading == PHONG {
-            brdf = phong_brdf(surface, in_.towards);
-        } else {
-            brdf = metallic_roughness_brdf(surface, in_.towards);
+        var share = shadow;
+        if light.face_count > 0u && s.receives_shadow {
+            // What faces away stands in its own shadow.
+            var lit = 0.0;
+            if dot(s.normal, in_.towards) > 0.0 {
+                lit = map_visibility(light, s.position, s.face_normal);
+            }
+            share *= 1.0 - light.shadow_intensity * (1.0 - lit);
         }
-        var lit = 1.0;
-        if light.face_count > 0u && s.is_receiver && dot(surface.normal, in_.towards) > 0.0 {
-            lit = 1.0 - light.shadow_intensity * (1.0 - map_visibility(light, f.p_in_world, s.face_normal));
-        }
-        sum += light.color * in_.strength * lit * brdf;
+        sum += shade(s, LightSample(in_.towards, light.color * in_.strength, share, light.kind));
     }
     return sum;
 }
 
 // Light that reaches the place from everywhere.
-fn ambient_light(f: Fragment, s: Place) -> vec3<f32> {
+fn ambient_light(s: Surface) -> vec3<f32> {
     var sum = frame.ambient.rgb;
     for (var i = 0u; i < frame.light_count; i++) {
         let light = lights[i];
         if any(light.ambient > vec3<f32>(0.0)) {
-            sum += light.ambient * incidence(light, f.p_in_world).strength;
+            sum += light.ambient * incidence(light, s.position).strength;
         }
     }
-    return sum * material.ambient * s.occlusion * s.base_color.rgb;
+    return ambient(s, sum);
 }
 
-fn base(f: Fragment, s: Place) -> vec3<f32> {
-    var color = s.emissive;
-    if s.is_unlit {
-        color += s.base_color.rgb;
-    } else {
-        color += ambient_light(f, s) + reflected(f, s);
+// Linear RGB and opacity.
+fn base(s: Surface) -> vec4<f32> {
+    var lit = s.base_color.rgb;
+    if !s.is_unlit {
+        lit = ambient_light(s) + reflected(s, 1.0);
     }
-    return mix(color, frame.fog_color, fog_share(s.distance));
+    let color = finish(s, lit);
+    return vec4<f32>(mix(color.rgb, frame.fog_color, fog_share(s.distance)), color.a);
 }
 
 // Opaque surfaces: ambient and emitted light, and the view's lights.
 @fragment
 fn opaque(f: Fragment) -> @location(0) vec4<f32> {
     let s = place(f);
-    return vec4<f32>(base(f, s), 1.0);
+    return vec4<f32>(base(s).rgb, 1.0);
 }
 
 // The same with holes.
@@ -192,30 +181,36 @@ fn masked(f: Fragment) -> @location(0) vec4<f32> {
     if s.base_color.a < material.alpha_cutoff {
         discard;
     }
-    return vec4<f32>(base(f, s), 1.0);
+    return vec4<f32>(base(s).rgb, 1.0);
 }
 
 // Mixed over what is behind: premultiplied.
 @fragment
 fn blended(f: Fragment) -> @location(0) vec4<f32> {
     let s = place(f);
-    let alpha = saturate(s.base_color.a);
-    return vec4<f32>(base(f, s) * alpha, alpha);
+    let color = base(s);
+    let alpha = saturate(color.a);
+    return vec4<f32>(color.rgb * alpha, alpha);
 }
 
-// The view's lights alone.
-fn lights_alone(f: Fragment) -> vec4<f32> {
+// The view's lights alone, to be added to what is there.
+fn addition(f: Fragment, shadow: f32) -> vec4<f32> {
     let s = place(f);
     if s.is_unlit || (material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff) {
         discard;
     }
-    return vec4<f32>(reflected(f, s) * (1.0 - fog_share(s.distance)), 0.0);
+    return vec4<f32>(finished_addition(s, reflected(s, shadow)) * (1.0 - fog_share(s.distance)), 0.0);
 }
 
-// To be added to what is there.
 @fragment
 fn added(f: Fragment) -> @location(0) vec4<f32> {
-    return lights_alone(f);
+    return addition(f, 1.0);
+}
+
+// The same where the light's shadow volumes are, for shapes whose own shader may make something of the shadow.
+@fragment
+fn added_in_shadow(f: Fragment) -> @location(0) vec4<f32> {
+    return addition(f, 1.0 - lights[view.first_light].shadow_intensity);
 }
 
 // Share of one light that a map lets through. Cone, distance and orientation do not count.
@@ -230,7 +225,7 @@ fn share_through_map(f: Fragment) -> vec4<f32> {
     }
     let light = lights[view.shown_light];
     var lit = 1.0;
-    if light.face_count > 0u && s.is_receiver {
+    if light.face_count > 0u && s.receives_shadow {
         lit = map_visibility(light, f.p_in_world, s.face_normal);
     }
     return vec4<f32>(vec3<f32>(lit), 1.0);
@@ -251,7 +246,7 @@ fn shown_share(f: Fragment) -> f32 {
 @fragment
 fn added_soft(f: Fragment) -> @location(0) vec4<f32> {
     let shown = 1.0 - lights[view.first_light].shadow_intensity * (1.0 - shown_share(f));
-    return lights_alone(f) * shown;
+    return addition(f, shown);
 }
 
 // The share alone.

@@ -52,6 +52,7 @@ pub(crate) struct Material {
     pub(crate) alpha_mode: u32,
     pub(crate) spare: u32,
     pub(crate) textures: [Texture; 5],
+    pub(crate) params: [[f32; 4]; 16],
 }
 
 /// `Texture` of shaders/material.wgsl.
@@ -130,6 +131,7 @@ pub(crate) struct Frame {
     pub(crate) fog_kind: u32,
     pub(crate) light_count: u32,
     pub(crate) spare: [u32; 2],
+    pub(crate) world_from_room: [[f32; 4]; 4],
 }
 
 /// `Film` of film.wgsl.

@@ -12,6 +12,8 @@ pub(crate) struct GpuMaterial {
     pub(crate) group: wgpu::BindGroup,
     pub(crate) alpha: AlphaMode,
     pub(crate) double_sided: bool,
+    /// Number of its shader; see [`crate::author`].
+    pub(crate) shader: u32,
     /// Keeps the pictures, which other materials may share.
     _pictures: Vec<Arc<Picture>>,
 }
@@ -36,13 +38,14 @@ impl MaterialCache {
         Ok(MaterialCache { pictures: HashMap::new(), samplers: HashMap::new(), white })
     }
 
-    /// Sends a material to the GPU. What is wrong with its pictures goes to `report`, and they stay white.
+    /// Sends a material with the number of its shader to the GPU. What is wrong with its pictures goes to `report`, and they stay white.
     pub(crate) fn make(
         &mut self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         layout: &wgpu::BindGroupLayout,
         material: &Material,
+        shader: u32,
         mut report: impl FnMut(String),
     ) -> GpuMaterial {
         let slots = [
@@ -82,6 +85,7 @@ impl MaterialCache {
             group,
             alpha: material.alpha,
             double_sided: material.double_sided,
+            shader,
             _pictures: bound.into_iter().map(|b| b.0).collect(),
         }
     }
@@ -126,6 +130,7 @@ fn uniform_of(material: &Material) -> uniforms::Material {
     uniform.normal_scale = material.normal_scale;
     uniform.occlusion_strength = material.occlusion_strength;
     uniform.ambient = 1.0;
+    uniform.params = material.shader.as_ref().map_or_else(bytemuck::Zeroable::zeroed, crate::author::values_of);
     match material.shading {
         Shading::MetallicRoughness { metallic, roughness } => {
             (uniform.metallic, uniform.roughness, uniform.shading) = (metallic, roughness, 0);

@@ -7,4 +7,4 @@ mod texture;
 
 pub(crate) use material::{GpuMaterial, MaterialCache};
 pub(crate) use mesh::{GpuMesh, VERTEX_BUFFERS, make_mesh};
-pub(crate) use slab::Slab;
+pub(crate) use slab::{KEEP_FRAMES, Slab};

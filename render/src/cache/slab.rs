@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Frames that an entry outlives its last use.
-const KEEP_FRAMES: u64 = 120;
+pub(crate) const KEEP_FRAMES: u64 = 120;
 
 /// GPU copies of shared values.
 pub(crate) struct Slab<K, V> {

@@ -1,12 +1,4 @@
 // Reflection of light that comes from one direction.
-struct Surface {
-    normal: vec3<f32>,
-    towards_eye: vec3<f32>,
-    base_color: vec3<f32>,
-    metallic: f32,
-    // Square of the perceptual roughness.
-    alpha: f32,
-};
 
 // Reflected radiance per irradiance of light along `towards` (cosine included); glTF 2.0 appendix B.
 fn metallic_roughness_brdf(s: Surface, towards: vec3<f32>) -> vec3<f32> {
@@ -15,16 +7,19 @@ fn metallic_roughness_brdf(s: Surface, towards: vec3<f32>) -> vec3<f32> {
     let halfway = normalize(towards + s.towards_eye + vec3<f32>(1e-8, 0.0, 0.0));
     let n_h = saturate(dot(s.normal, halfway));
     let v_h = saturate(dot(s.towards_eye, halfway));
-    let a2 = s.alpha * s.alpha;
+    let base_color = s.base_color.rgb;
+    let roughness = saturate(s.roughness);
+    let alpha = max(roughness * roughness, 0.002);
+    let a2 = alpha * alpha;
     let d = n_h * n_h * (a2 - 1.0) + 1.0;
     let distribution = a2 / (PI * d * d);
     let visibility = 0.5 / (n_l * sqrt(n_v * n_v * (1.0 - a2) + a2) + n_v * sqrt(n_l * n_l * (1.0 - a2) + a2) + 1e-7);
     let grazing = pow(1.0 - v_h, 5.0);
     let f_dielectric = mix(0.04, 1.0, grazing);
-    let f_metal = mix(s.base_color, vec3<f32>(1.0), grazing);
+    let f_metal = mix(base_color, vec3<f32>(1.0), grazing);
     let specular = distribution * visibility;
-    let dielectric = mix(s.base_color / PI, vec3<f32>(specular), f_dielectric);
-    return mix(dielectric, f_metal * specular, s.metallic) * n_l;
+    let dielectric = mix(base_color / PI, vec3<f32>(specular), f_dielectric);
+    return mix(dielectric, f_metal * specular, saturate(s.metallic)) * n_l;
 }
 
 // The same for Blinn-Phong, so that light of intensity pi gives the sums of X3D's lighting equations.
@@ -35,7 +30,7 @@ fn phong_brdf(s: Surface, towards: vec3<f32>) -> vec3<f32> {
     }
     let halfway = normalize(towards + s.towards_eye + vec3<f32>(1e-8, 0.0, 0.0));
     let highlight = pow(max(dot(s.normal, halfway), 0.0), material.exponent);
-    return (s.base_color * n_l + material.specular * highlight) / PI;
+    return (s.base_color.rgb * n_l + material.specular * highlight) / PI;
 }
 
 const PI: f32 = 3.14159265358979;

@@ -9,6 +9,8 @@ struct Frame {
     fog_range: f32,
     fog_kind: u32,
     light_count: u32,
+    // The room's pose in the world, for shaders of authors.
+    world_from_room: mat4x4<f32>,
 };
 
 struct Light {

@@ -22,6 +22,8 @@ struct Material {
     shading: u32,
     alpha_mode: u32,
     textures: array<Texture, 5>,
+    // Of the shape's own shader.
+    params: array<vec4<f32>, 16>,
 };
 
 const METALLIC_ROUGHNESS: u32 = 0u;

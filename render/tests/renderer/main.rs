@@ -1,5 +1,6 @@
 //! Pictures of scenes made in code, compared with numbers that follow from the scene.
 
+mod author;
 mod deformation;
 mod layouts;
 mod lights;

@@ -26,7 +26,9 @@ pub use adjacency::{Edge, Edges};
 pub use bounds::Aabb;
 pub use deform::{Deformed, deformed};
 pub use light::{Light, LightKind, MapFilter, MapSettings, MapUpdate, ShadowMethod};
-pub use material::{AlphaMode, Filter, Image, Material, Sampler, Shading, TextureRef, Wrap};
+pub use material::{
+    AlphaMode, Filter, FragmentShader, Image, Material, Sampler, ShaderParam, ShaderSource, Shading, TextureRef, Wrap,
+};
 pub use mesh::{Mesh, MeshError, MorphTarget, Topology};
 pub use scene::{Background, Drawable, Film, Fog, FogKind, Pose, Scene, StencilGroup, StencilMode};
 pub use score::{Score, difference, score};

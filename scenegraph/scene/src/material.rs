@@ -1,6 +1,6 @@
-//! Materials, textures and their pictures.
+//! Materials, textures and their pictures, and shaders of authors.
 
-use glam::{Affine2, Vec3, Vec4};
+use glam::{Affine2, Vec2, Vec3, Vec4};
 use std::sync::Arc;
 
 /// How a surface looks.
@@ -32,6 +32,39 @@ pub struct Material {
     pub alpha: AlphaMode,
     /// Visible and lit from both sides; otherwise the side from which a triangle winds counter-clockwise.
     pub double_sided: bool,
+    /// Replaces parts of the shading.
+    pub shader: Option<FragmentShader>,
+}
+
+/// WGSL that replaces parts of the shading of a surface (003 section 5 and future work).
+#[derive(Clone, Debug, PartialEq)]
+pub struct FragmentShader {
+    /// The text; equal `Arc`s are compared quickly.
+    pub source: Arc<ShaderSource>,
+    /// Names and values that the text reads as `params.name`.
+    pub params: Vec<(Arc<str>, ShaderParam)>,
+}
+
+/// A text in WGSL.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct ShaderSource {
+    /// File or node, for messages; line and column follow it.
+    pub name: String,
+    /// The text.
+    pub text: String,
+}
+
+/// A value that a shader reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShaderParam {
+    /// `f32`
+    Scalar(f32),
+    /// `vec2<f32>`
+    Vec2(Vec2),
+    /// `vec3<f32>`; linear RGB where it is a colour.
+    Vec3(Vec3),
+    /// `vec4<f32>`
+    Vec4(Vec4),
 }
 
 /// Reflection model.
@@ -159,6 +192,7 @@ impl Default for Material {
             emissive_texture: None,
             alpha: AlphaMode::Opaque,
             double_sided: false,
+            shader: None,
         }
     }
 }

@@ -23,6 +23,8 @@ pub struct Scene {
     pub exposure: f32,
     /// Texture memory for all shadow maps, bytes. Where it is short, the least important lights get smaller maps.
     pub map_memory_bytes: u64,
+    /// Where this scene's space is in a world that moves, for shaders that draw patterns in the world.
+    pub world_from_room: Mat4,
 }
 
 impl Default for Scene {
@@ -37,6 +39,7 @@ impl Default for Scene {
             fog: None,
             exposure: 1.0,
             map_memory_bytes: 1 << 30,
+            world_from_room: Mat4::IDENTITY,
         }
     }
 }

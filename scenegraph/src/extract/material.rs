@@ -2,6 +2,7 @@
 
 use super::problem::Problems;
 use super::read::{Reader, name_of, stamp};
+use super::shader::{Shaders, shader};
 use super::texture::{Pictures, texture};
 use glam::{Vec3, Vec4};
 use slotmap::SecondaryMap;
@@ -15,6 +16,8 @@ pub(super) struct CachedMaterial {
     pub(super) material: Arc<Material>,
     pub(super) casts_shadow: bool,
     pub(super) deps: Vec<NodeId>,
+    /// It names a shader, which may not be there.
+    has_shader: bool,
     stamp: (Revision, usize),
 }
 
@@ -27,7 +30,7 @@ pub(super) struct Materials {
 impl Materials {
     pub(super) fn new() -> Materials {
         let material = Arc::new(plain(String::new()));
-        let plain = CachedMaterial { material, casts_shadow: true, deps: Vec::new(), stamp: (0, 0) };
+        let plain = CachedMaterial { material, casts_shadow: true, deps: Vec::new(), has_shader: false, stamp: (0, 0) };
         Materials { cache: SecondaryMap::new(), plain }
     }
 
@@ -36,16 +39,22 @@ impl Materials {
         graph: &Graph,
         appearance: Option<NodeId>,
         pictures: &mut Pictures,
+        shaders: &mut Shaders,
         problems: &mut Problems,
     ) -> CachedMaterial {
         let Some(appearance) = appearance else { return self.plain.clone() };
         if let Some(known) = self.cache.get(appearance).filter(|c| c.stamp == stamp(graph, &c.deps)) {
             return known.clone();
         }
-        let mut made = make(graph, appearance, pictures, problems);
+        let mut made = make(graph, appearance, pictures, shaders, problems);
         made.stamp = stamp(graph, &made.deps);
         self.cache.insert(appearance, made.clone());
         made
+    }
+
+    /// Every material with a shader is made anew, for the text may be another one.
+    pub(super) fn forget_shaders(&mut self) {
+        self.cache.retain(|_, cached| !cached.has_shader);
     }
 
     /// Forgets materials of dead nodes.
@@ -64,7 +73,13 @@ fn plain(name: String) -> Material {
     }
 }
 
-fn make(graph: &Graph, appearance: NodeId, pictures: &mut Pictures, problems: &mut Problems) -> CachedMaterial {
+fn make(
+    graph: &Graph,
+    appearance: NodeId,
+    pictures: &mut Pictures,
+    shaders: &mut Shaders,
+    problems: &mut Problems,
+) -> CachedMaterial {
     let look = Reader::new(graph, appearance);
     let mut deps = vec![appearance];
     let mut made = match look.node("material") {
@@ -85,8 +100,14 @@ fn make(graph: &Graph, appearance: NodeId, pictures: &mut Pictures, problems: &m
         _ => AlphaMode::Opaque,
     };
     made.double_sided = look.get("double_sided");
+    let shader_node = look.node("shader");
+    if let Some(node) = shader_node {
+        deps.push(node);
+        made.shader = shader(graph, node, (&pictures.asset_root, shaders), problems);
+    }
+    let has_shader = shader_node.is_some();
     let casts_shadow = look.get("shadow_caster") && (made.alpha != AlphaMode::Blend || look.get("transparent_caster"));
-    CachedMaterial { material: Arc::new(made), casts_shadow, deps, stamp: (0, 0) }
+    CachedMaterial { material: Arc::new(made), casts_shadow, deps, has_shader, stamp: (0, 0) }
 }
 
 fn surface(graph: &Graph, read: &Reader<'_>, texture: &mut dyn FnMut(&str) -> Option<TextureRef>) -> Material {

@@ -7,6 +7,7 @@
 
 mod dirty;
 mod drawable;
+mod files;
 mod instance;
 mod light;
 mod material;
@@ -15,6 +16,7 @@ mod problem;
 mod read;
 mod role;
 mod room;
+mod shader;
 mod shape;
 mod skin;
 mod stencil;
@@ -37,11 +39,12 @@ use mesh::Meshes;
 use problem::Problems;
 use role::{Role, Types};
 use room::{Globals, Room, read_environment, read_head, read_room, read_viewpoints};
+use shader::Shaders;
 use shape::{Resources, Shapes};
 use skin::Bindings;
 use slotmap::SecondaryMap;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use sweep::{Touched, lod_choice, sweep};
 use texture::Pictures;
 use umbriel_fields::{Graph, NodeId, Revision};
@@ -84,6 +87,8 @@ pub struct Extractor {
     viewpoint_places: Vec<u32>,
     viewpoints: Vec<Viewpoint>,
     resources: Resources,
+    /// Shapes to read anew, although no field of theirs was written.
+    reread: Vec<NodeId>,
 }
 
 impl Default for Extractor {
@@ -99,6 +104,7 @@ impl Extractor {
             meshes: Meshes::default(),
             materials: Materials::new(),
             pictures: Pictures::new(PathBuf::from(".")),
+            shaders: Shaders::default(),
             problems: Problems::default(),
         };
         Extractor {
@@ -120,10 +126,11 @@ impl Extractor {
             viewpoint_places: Vec::new(),
             viewpoints: Vec::new(),
             resources,
+            reread: Vec::new(),
         }
     }
 
-    /// Pictures that `ImageTexture.url` names lie below this folder; no other file is read.
+    /// Files that nodes name (pictures, shaders) lie below this folder; no other file is read.
     pub fn with_asset_root(mut self, folder: impl Into<PathBuf>) -> Extractor {
         self.resources.pictures.asset_root = folder.into();
         self
@@ -139,6 +146,7 @@ impl Extractor {
     /// with the same graph and the same scene.
     pub fn update(&mut self, graph: &Graph, scene: &mut Scene) -> ExtractStats {
         let mut dirty = self.gather(graph);
+        dirty.shapes.extend(self.reread.drain(..));
         if scene.drawables.len() != self.slots.places.len() {
             dirty.everything();
         }
@@ -161,6 +169,7 @@ impl Extractor {
             self.viewpoints = read_viewpoints(graph, &self.instances, &self.viewpoint_places, &self.room);
         }
         if dirty.environment {
+            scene.world_from_room = self.room.world_from_room;
             read_environment(graph, &self.globals, &self.room, &mut self.resources.problems, scene);
         }
         stats
@@ -169,6 +178,21 @@ impl Extractor {
     /// Problems found since this was last called, each once until it is mended and comes back.
     pub fn problems(&mut self) -> Vec<Problem> {
         self.resources.problems.drain()
+    }
+
+    /// The files of shaders that were read, or could not be.
+    pub fn shader_files(&self) -> impl Iterator<Item = &Path> {
+        self.resources.shaders.files()
+    }
+
+    /// Files changed: shaders among them are read again at the next update. True if any of them was one.
+    pub fn forget_shaders(&mut self, files: &[PathBuf]) -> bool {
+        let forgotten = self.resources.shaders.forget(files);
+        if forgotten {
+            self.resources.materials.forget_shaders();
+            self.reread.extend(self.shapes.states.keys());
+        }
+        forgotten
     }
 
     /// The place of a light node in [`Scene::lights`]; None if it is off, hidden or no light of the world.

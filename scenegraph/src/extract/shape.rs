@@ -4,6 +4,7 @@ use super::material::Materials;
 use super::mesh::Meshes;
 use super::problem::Problems;
 use super::read::{Reader, label};
+use super::shader::Shaders;
 use super::skin::{JointBounds, Skin};
 use super::texture::Pictures;
 use slotmap::SecondaryMap;
@@ -41,6 +42,7 @@ pub(super) struct Resources {
     pub(super) meshes: Meshes,
     pub(super) materials: Materials,
     pub(super) pictures: Pictures,
+    pub(super) shaders: Shaders,
     pub(super) problems: Problems,
 }
 
@@ -93,10 +95,10 @@ impl Shapes {
 
 fn read(graph: &Graph, shape: NodeId, resources: &mut Resources) -> ShapeState {
     let read = Reader::new(graph, shape);
-    let Resources { meshes, materials, pictures, problems } = resources;
+    let Resources { meshes, materials, pictures, shaders, problems } = resources;
     let geometry = read.node("geometry");
     let cached = geometry.map(|node| meshes.get(graph, node, pictures, problems));
-    let material = materials.get(graph, read.node("appearance"), pictures, problems);
+    let material = materials.get(graph, read.node("appearance"), pictures, shaders, problems);
     let skin_node = read.node("skin");
     let mut deps = cached.as_ref().map(|c| c.deps.clone()).unwrap_or_default();
     deps.extend(&material.deps);

@@ -1,4 +1,4 @@
-//! Shape and Appearance.
+//! Shape, Appearance, and shaders of authors.
 
 use umbriel_fields::{Field, NodeType};
 
@@ -23,6 +23,13 @@ pub(super) fn types() -> Vec<NodeType> {
             .field(
                 Field::new("transparent_caster", false).doc("Half-transparent shapes throw shadows too, as if they were opaque."),
             )
-            .field(Field::new("double_sided", false).doc("Seen and lit from both sides.")),
+            .field(Field::new("double_sided", false).doc("Seen and lit from both sides."))
+            .field(Field::node("shader").alias("shaders").doc("A FragmentShader that replaces parts of the shading.")),
+        NodeType::new(
+            "FragmentShader",
+            "WGSL that replaces parts of the shading of shapes. Fields that are added to it are its `params`.",
+        )
+        .field(Field::new("url", "").doc("File below the asset root; used where `source` is empty."))
+        .field(Field::new("source", "").doc("The text itself.")),
     ]
 }

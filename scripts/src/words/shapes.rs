@@ -21,6 +21,26 @@ pub(super) fn teach(words: &mut Words<'_>) {
     short_form(words, "unlit(fields: map) -> Node", "An UnlitMaterial.", "UnlitMaterial");
     short_form(words, "texture(fields: map) -> Node", "An ImageTexture.", "ImageTexture");
     short_form(words, "appearance(fields: map) -> Node", "An Appearance.", "Appearance");
+    shaders(words);
+}
+
+fn shaders(words: &mut Words<'_>) {
+    let stage = words.stage.clone();
+    words.word(
+        "shader(file: string, params: map) -> Node",
+        "A FragmentShader from a file of the world's folder. Each entry of the map becomes a field, which the WGSL reads as \
+         `params.name`: `shader(\"toon.wgsl\", #{ bands: 3.0 })`.",
+        move |context: Context<'_>, file: &str, params: Map| {
+            let node = made(&stage, &context, "FragmentShader", &Map::from([("url".into(), file.to_string().into())]))?;
+            match params.iter().try_for_each(|(name, value)| stage.add_field(node, name, value)) {
+                Ok(()) => Ok(node),
+                Err(error) => {
+                    stage.delete(node)?;
+                    Err(error)
+                }
+            }
+        },
+    );
 }
 
 type Context<'a> = NativeCallContext<'a>;

@@ -1,10 +1,11 @@
 //! Meshes, materials, textures, surroundings: what is given, and what is wrong with it.
 
 use super::World;
+use crate::Extractor;
 use glam::{Affine2, Vec2, Vec3, vec2, vec3};
 use std::sync::Arc;
-use umbriel_fields::{Color, Image, NodeId, Value};
-use umbriel_scene::{AlphaMode, Filter, Fog, FogKind, Shading, Wrap};
+use umbriel_fields::{Color, Field, Image, NodeId, Value};
+use umbriel_scene::{AlphaMode, Filter, Fog, FogKind, ShaderParam, Shading, Wrap};
 
 fn painted(w: &mut World, kind: &str) -> [NodeId; 3] {
     let shape = w.shape(&[w.root()], "it");
@@ -239,4 +240,74 @@ fn surroundings() {
     assert_eq!((w.scene.background.zenith, w.scene.exposure), (crate::nodes::environment::ZENITH, 1.0));
     assert!(w.scene.fog.is_none());
     assert_eq!(w.problems(), ["Environment 'Environment', exposure: NaN makes no sense here; 1 is used"]);
+}
+
+#[test]
+fn shaders_come_from_text_and_files_and_files_are_read_again() {
+    let folder = std::env::temp_dir().join(format!("umbriel-shaders-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("own.wgsl");
+    std::fs::write(&file, "first").unwrap();
+    let mut w = World::new();
+    w.extractor = Extractor::new().with_asset_root(&folder);
+    let [_, appearance, _] = painted(&mut w, "PhysicalMaterial");
+    let shader = w.node("FragmentShader", "mine");
+    w.graph.add_field(shader, Field::new("tint", Color(Vec3::X))).unwrap();
+    let bands = w.graph.add_field(shader, Field::new("bands", 3i64)).unwrap();
+    w.set(appearance, "shader", shader);
+    w.set(shader, "source", "text");
+    let seen = |w: &mut World| {
+        w.update();
+        w.drawable("it").material.shader.clone().map(|s| (s.source.name.clone(), s.source.text.clone(), s.params.len()))
+    };
+    assert_eq!(seen(&mut w), Some(("FragmentShader 'mine', source".into(), "text".into(), 2)));
+    w.set(shader, "source", "");
+    w.set(shader, "url", "own.wgsl");
+    assert_eq!(seen(&mut w), Some(("own.wgsl".into(), "first".into(), 2)));
+    std::fs::write(&file, "second").unwrap();
+    assert!(!w.extractor.forget_shaders(&[folder.join("other.wgsl")]));
+    assert_eq!(seen(&mut w).unwrap().1, "first", "nobody said that it changed");
+    assert_eq!(w.extractor.shader_files().collect::<Vec<_>>(), [file.as_path()]);
+    assert!(w.extractor.forget_shaders(std::slice::from_ref(&file)));
+    assert_eq!(seen(&mut w).unwrap().1, "second");
+    w.graph.set(bands, 4i64).unwrap();
+    w.update();
+    let params = w.drawable("it").material.shader.clone().unwrap().params;
+    assert_eq!(params, [("tint".into(), ShaderParam::Vec3(Vec3::X)), ("bands".into(), ShaderParam::Scalar(4.0))]);
+    assert_eq!(w.problems(), Vec::<String>::new());
+    // A file that is not there is told, and used when it comes.
+    std::fs::remove_file(&file).unwrap();
+    w.extractor.forget_shaders(std::slice::from_ref(&file));
+    assert_eq!(seen(&mut w), None);
+    assert!(w.problems()[0].starts_with("FragmentShader 'mine', url: file 'own.wgsl': "));
+    std::fs::write(&file, "third").unwrap();
+    w.extractor.forget_shaders(std::slice::from_ref(&file));
+    assert_eq!(seen(&mut w).unwrap().1, "third");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn wrong_shader_nodes_are_reported() {
+    let rows: [(&str, Option<Field>, &str); 5] = [
+        ("", None, "url: neither source nor url is set; the surface is shown without it"),
+        ("../own.wgsl", None, "url: file '../own.wgsl' is not below the asset root; the surface is shown without it"),
+        ("no.wgsl", None, "url: file 'no.wgsl': No such file"),
+        ("x", Some(Field::new("strength", f32::NAN)), "params: `strength` is not finite and taken as 0"),
+        ("x", Some(Field::new("word", "text")), "params: `word` is string"),
+    ];
+    for (text, field, expected) in rows {
+        let mut w = World::new();
+        let [_, appearance, _] = painted(&mut w, "PhysicalMaterial");
+        let shader = w.node("FragmentShader", "mine");
+        w.set(shader, if field.is_some() { "source" } else { "url" }, text);
+        if let Some(field) = field {
+            w.graph.add_field(shader, field).unwrap();
+        }
+        w.set(appearance, "shader", shader);
+        w.update();
+        let problems = w.problems();
+        assert_eq!(problems.len(), 1, "{problems:?}");
+        assert!(problems[0].contains(expected), "{problems:?} without {expected}");
+        assert_eq!(w.names(), ["it"]);
+    }
 }
