@@ -179,7 +179,7 @@ fn a_wrong_shader_costs_itself() {
     let wrong = scene(Material { shader: shader("fn shade() {", &[]), ..matt(0.5, 0.5, 0.5) }, ShadowMethod::Map);
     let first = stage.drawn(&wrong);
     assert_eq!(first.problems.len(), 1, "{:?}", first.problems);
-    assert!(first.problems[0].contains("own.wgsl:1:12"), "{:?}", first.problems);
+    assert!(first.problems[0].contains("own.wgsl:1:13"), "{:?}", first.problems);
     assert!(first.layers == plain.layers, "the shape changed");
     assert_eq!(stage.drawn(&wrong).problems, Vec::<String>::new(), "told once");
     let mended = scene(Material { shader: shader(BY_SHADOW, &[]), ..matt(0.5, 0.5, 0.5) }, ShadowMethod::Map);

@@ -3,6 +3,7 @@
 //! Names follow X3D 4 where X3D has the node; AVANGO's and the papers' names are aliases. Any spelling of a name
 //! (`castShadow`, `CastShadow`, `cast_shadow`) is the same name, so only other words are listed as aliases.
 
+mod aim;
 pub(crate) mod environment;
 mod geometry;
 mod group;
@@ -10,6 +11,7 @@ mod light;
 mod material;
 mod shape;
 mod skin;
+mod sky;
 mod stencil;
 mod texture;
 mod view;
@@ -28,6 +30,8 @@ pub fn node_types() -> Vec<NodeType> {
         light::types(),
         stencil::types(),
         environment::types(),
+        aim::types(),
+        sky::types(),
         view::types(),
     ]
     .into_iter()
