@@ -283,3 +283,35 @@ fn extractor_beside(path: &Path) -> Extractor {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Extractor::new().with_asset_root(folder)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_saved_shader_is_taken_over_and_the_world_goes_on() {
+        let folder = std::env::temp_dir().join(format!("umbriel-session-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let (world, shader) = (folder.join("w.rhai"), folder.join("own.wgsl"));
+        let script = "let n = make(\"Group\", #{ name: \"n\" }); n.add_field(\"count\", 0); on_frame(|t, dt| { n.count += 1; });
+            world.add(shape(cuboid(vec3(1, 1, 1)), appearance(#{ shader: shader(\"own.wgsl\", #{}) })));";
+        std::fs::write(&world, script).unwrap();
+        std::fs::write(&shader, "first").unwrap();
+        let mut session = Session::open(&world).unwrap();
+        let step = |session: &mut Session, time_s| {
+            session.step(time_s);
+            let text = session.scene().drawables[0].material.shader.as_ref().map(|s| s.source.text.clone());
+            let graph = session.graph();
+            (text.unwrap_or_default(), graph.get_named::<i64>(graph.find("n").unwrap(), "count").unwrap())
+        };
+        assert_eq!(step(&mut session, 0.0), ("first".into(), 1));
+        assert!(session.files().contains(&shader), "{:?}", session.files());
+        std::fs::write(&shader, "second").unwrap();
+        session.files_changed(std::slice::from_ref(&shader));
+        assert_eq!(step(&mut session, 1.0), ("second".into(), 2), "the world goes on");
+        session.files_changed(&[world.clone(), shader]);
+        assert_eq!(step(&mut session, 2.0), ("second".into(), 1), "the world begins anew");
+        assert_eq!(session.problems(), Vec::<String>::new());
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}

@@ -36,7 +36,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
     let truncated = folder("command").join("truncated.glb");
     std::fs::write(&truncated, b"glTF\x02\0\0\0\xff\0\0\0").expect("a file can be written");
     // Name, line of the world, what the message must contain. The rest of the world is drawn.
-    let rows: [(&str, &str, &[&str]); 16] = [
+    let rows: [(&str, &str, &[&str]); 17] = [
         (
             "negative_soft_range",
             r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "volume", soft: "range", soft_range: -1.0 }));"#,
@@ -71,6 +71,11 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
             "missing_texture",
             r#"world.add(shape(make("Box"), make("PhysicalMaterial", #{ base_texture: make("ImageTexture", #{ url: "no.png" }) })));"#,
             &["missing_texture.rhai:4", "no.png"],
+        ),
+        (
+            "no_such_day",
+            r#"let sky = make("Ephemeris", #{ date: "2026-02-30" });"#,
+            &["no_such_day.rhai:4", "there is no such day", "date", "Ephemeris"],
         ),
         (
             "missing_shader",
@@ -111,7 +116,12 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
 
 #[test]
 fn a_wrong_world_ends_with_a_message() {
-    let rows: [(&str, &str, &[&str]); 7] = [
+    let rows: [(&str, &str, &[&str]); 8] = [
+        (
+            "latitude_100",
+            "let a = 1;\nlet sky = make(\"Ephemeris\", #{ latitude: 100.0 });",
+            &["latitude_100.rhai:2", "latitude", "Ephemeris", "100"],
+        ),
         ("unknown_node", "let a = 1;\nlet b = make(\"SpotLihgt\");", &["unknown_node.rhai:2", "SpotLihgt", "SpotLight"]),
         (
             "unknown_field",

@@ -28,6 +28,8 @@ const SOFT_RANGE: u16 = 19;
 const SHADOW_BRIGHTNESS: u16 = 20;
 const IS_DARK: u16 = 21;
 const PER_LUX: u16 = 22;
+const SUN_SHINES: u16 = 23;
+const MOON_SHINES: u16 = 24;
 
 /// Street lamps are lit below this illuminance, lux.
 const DUSK_LX: f64 = 35.0;
@@ -94,6 +96,8 @@ pub(super) fn node_type() -> NodeType {
         ))
         .field(Field::new("is_dark", false).output().doc("Lamps are on: for their `on`."))
         .field(number("per_lux", 0.0, "", "Intensity of a light of this world per lux or candela."))
+        .field(Field::new("sun_shines", true).output().doc("For the `on` of its light."))
+        .field(Field::new("moon_shines", false).output().doc("For the `on` of its light."))
         .evaluate(evaluate)
 }
 
@@ -119,8 +123,8 @@ fn evaluate(evaluation: &mut Evaluation<'_>) {
 
     // A parallel light of intensity pi makes a white surface 1.
     let per_lux = PI / white_lx;
-    light(evaluation, [SUN_INTENSITY, SUN_COLOR], sun * direct_share * per_lux);
-    light(evaluation, [MOON_INTENSITY, MOON_COLOR], moon * direct_share * per_lux);
+    light(evaluation, [SUN_INTENSITY, SUN_COLOR, SUN_SHINES], sun * direct_share * per_lux);
+    light(evaluation, [MOON_INTENSITY, MOON_COLOR, MOON_SHINES], moon * direct_share * per_lux);
     let source_rad = if sun_rad.to_degrees() > -12.0 { sun_rad } else { moon_rad.max(0.2) };
     let [zenith, horizon] = sky_colors(source_rad, depth, cover).map(|c| c * sky_lx / white_lx);
     let ambient = zenith * (2.0 / 3.0) + horizon / 3.0;
@@ -139,8 +143,9 @@ fn evaluate(evaluation: &mut Evaluation<'_>) {
 }
 
 /// The brightest channel goes into the intensity.
-fn light(evaluation: &mut Evaluation<'_>, [intensity, color]: [u16; 2], light: DVec3) {
+fn light(evaluation: &mut Evaluation<'_>, [intensity, color, shines]: [u16; 3], light: DVec3) {
     let brightest = light.max_element();
+    evaluation.set(shines, brightest > 0.0);
     evaluation.set(intensity, brightest as f32);
     if brightest > 0.0 {
         evaluation.set(color, Color((light / brightest).as_vec3()));
