@@ -1,7 +1,7 @@
 //! Aiming: a searchlight that angles turn, or that follows something.
 
 use glam::{Quat, Vec3};
-use umbriel_fields::{EnumValue, Evaluation, Field, NodeType};
+use umbriel_fields::{EnumValue, Evaluation, Field, NodeType, SetRule};
 
 const BY: u16 = 0;
 const AZIMUTH: u16 = 1;
@@ -27,11 +27,19 @@ pub(super) fn types() -> Vec<NodeType> {
         .field(Field::new("north", Vec3::NEG_Z).doc("Where azimuth 0 is; its height does not count."))
         .field(place("location", Vec3::ZERO, "Where it stands, in the same space as `target`."))
         .field(place("target", Vec3::NEG_Z, "What it points at: by a route from the translation of a Transform it follows."))
-        .field(Field::new("direction", Vec3::NEG_Z).output().doc("Unit vector; for the direction of a light."))
         .field(
-            Field::new("rotation", Quat::IDENTITY).output().doc("Turns -z to `direction` and keeps it upright; for a Transform."),
+            Field::new("direction", Vec3::NEG_Z)
+                .on_set(SetRule::Pulse)
+                .output()
+                .doc("Unit vector; for the direction of a light."),
         )
-        .field(Field::new("distance", 1.0f32).unit("m").output().doc("To `target`."))
+        .field(
+            Field::new("rotation", Quat::IDENTITY)
+                .on_set(SetRule::Pulse)
+                .output()
+                .doc("Turns -z to `direction` and keeps it upright; for a Transform."),
+        )
+        .field(Field::new("distance", 1.0f32).unit("m").on_set(SetRule::Pulse).output().doc("To `target`."))
         .evaluate(evaluate),
     ]
 }

@@ -3,7 +3,7 @@
 use super::illumination::{direct_lx, luminance, optical_depth, sky_colors, sky_lx, sunlight_lx, through_clouds};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
-use umbriel_fields::{Color, Evaluation, Field, NodeType};
+use umbriel_fields::{Color, Evaluation, Field, NodeType, SetRule};
 
 const SUN_ELEVATION: u16 = 0;
 const MOON_ELEVATION: u16 = 1;
@@ -38,9 +38,10 @@ const DUSK_LX: f64 = 35.0;
 const SHADOWS: [[f32; 3]; 3] = [[9.333, 6.0, 110.0], [13.35, 5.0, 120.0], [16.35, 8.0, 180.0]];
 
 pub(super) fn node_type() -> NodeType {
-    let color = |name: &'static str, doc: &'static str| Field::new(name, Color(Vec3::ZERO)).output().doc(doc);
+    let color =
+        |name: &'static str, doc: &'static str| Field::new(name, Color(Vec3::ZERO)).on_set(SetRule::Pulse).output().doc(doc);
     let number = |name: &'static str, value: f32, unit: &'static str, doc: &'static str| {
-        Field::new(name, value).unit(unit).output().doc(doc)
+        Field::new(name, value).unit(unit).on_set(SetRule::Pulse).output().doc(doc)
     };
     let half_turn = std::f64::consts::FRAC_PI_2;
     NodeType::new("Daylight", "What light sun, moon and weather make; routes take it to lights, sky, fog and shadows.")
@@ -94,10 +95,10 @@ pub(super) fn node_type() -> NodeType {
             "",
             "For the shadow_brightness of a light: 004 Table 2, brighter under clouds.",
         ))
-        .field(Field::new("is_dark", false).output().doc("Lamps are on: for their `on`."))
+        .field(Field::new("is_dark", false).on_set(SetRule::Pulse).output().doc("Lamps are on: for their `on`."))
         .field(number("per_lux", 0.0, "", "Intensity of a light of this world per lux or candela."))
-        .field(Field::new("sun_shines", true).output().doc("For the `on` of its light."))
-        .field(Field::new("moon_shines", false).output().doc("For the `on` of its light."))
+        .field(Field::new("sun_shines", true).on_set(SetRule::Pulse).output().doc("For the `on` of its light."))
+        .field(Field::new("moon_shines", false).on_set(SetRule::Pulse).output().doc("For the `on` of its light."))
         .evaluate(evaluate)
 }
 

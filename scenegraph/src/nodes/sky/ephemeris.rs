@@ -4,7 +4,7 @@ use super::illumination::moonlight_lx;
 use super::place::{Observer, Seen, date_from_text, unit};
 use glam::Vec3;
 use std::sync::Arc;
-use umbriel_fields::{Evaluation, Field, NodeType};
+use umbriel_fields::{Evaluation, Field, NodeType, SetRule};
 
 const DATE: u16 = 0;
 const HOUR: u16 = 1;
@@ -25,8 +25,9 @@ pub(super) fn node_type() -> NodeType {
     let number = |name: &'static str, value: f64, unit: &'static str, (low, high): (f64, f64), doc: &'static str| {
         Field::new(name, value).unit(unit).range(low, high).doc(doc)
     };
-    let angle = |name: &'static str, doc: &'static str| Field::new(name, 0.0f32).unit("rad").output().doc(doc);
-    let ray = |name: &'static str, doc: &'static str| Field::new(name, Vec3::NEG_Y).output().doc(doc);
+    let angle =
+        |name: &'static str, doc: &'static str| Field::new(name, 0.0f32).unit("rad").on_set(SetRule::Pulse).output().doc(doc);
+    let ray = |name: &'static str, doc: &'static str| Field::new(name, Vec3::NEG_Y).on_set(SetRule::Pulse).output().doc(doc);
     NodeType::new("Ephemeris", "Where sun and moon stand at a time and a place on earth; routes take them to lights.")
         .field(Field::new("date", "2026-06-21").doc("Day of the clock: year-month-day."))
         .field(number("hour", 12.0, "h", (-1e6, 1e6), "Time of the clock; more than 24 goes on to the next day."))
@@ -43,9 +44,22 @@ pub(super) fn node_type() -> NodeType {
         .field(ray("moon_direction", "Where moonlight goes."))
         .field(angle("moon_elevation", "Of the moon above the horizon, as it is seen."))
         .field(angle("moon_azimuth", "Of the moon from north by east."))
-        .field(Field::new("moon_lit", 0.0f32).output().doc("Share of the moon's disc that is lit: 0 is new, 1 is full."))
-        .field(Field::new("moon_illuminance", 0.0f32).unit("lx").output().doc("Of the moon at right angles, above the air."))
-        .field(Field::new("solar_time", 12.0f32).unit("h").output().doc("By the sun: 12 when it is highest."))
+        .field(
+            Field::new("moon_lit", 0.0f32)
+                .on_set(SetRule::Pulse)
+                .output()
+                .doc("Share of the moon's disc that is lit: 0 is new, 1 is full."),
+        )
+        .field(
+            Field::new("moon_illuminance", 0.0f32)
+                .unit("lx")
+                .on_set(SetRule::Pulse)
+                .output()
+                .doc("Of the moon at right angles, above the air."),
+        )
+        .field(
+            Field::new("solar_time", 12.0f32).unit("h").on_set(SetRule::Pulse).output().doc("By the sun: 12 when it is highest."),
+        )
         .evaluate(evaluate)
 }
 

@@ -6,7 +6,7 @@ use super::place::*;
 use crate::new_graph;
 use glam::Vec3;
 use std::f64::consts::PI;
-use umbriel_fields::{Color, Graph, NoHost, NodeId, Value};
+use umbriel_fields::{Color, Graph, NoHost, NodeId, Strength, Value};
 
 fn observer(date: &str, hour: f64, utc_offset_h: f64, latitude_deg: f64, longitude_deg: f64) -> Observer {
     let date = date_from_text(date).unwrap();
@@ -186,4 +186,15 @@ fn a_day_gets_brighter_and_darker() {
     assert!(overcast.0 == 0.0 && overcast.1 > noon.1 && overcast.2 > noon.2, "{overcast:?} {noon:?}");
     assert!(moonless.3 == 0.0 && moonless.1 < night.1, "{moonless:?}");
     assert!(noon.1 > evening.1 && evening.1 > night.1 && noon.2 < evening.2 && evening.2 < night.2);
+}
+
+/// Routes carry what is written: a light that is off by day must be told so, although the field was false before.
+#[test]
+fn what_did_not_change_is_told_at_first() {
+    let mut graph = new_graph();
+    let (day, moon) = (graph.create("Daylight").unwrap(), graph.create("DirectionalLight").unwrap());
+    let (from, to) = (graph.field(day, "moon_shines").unwrap(), graph.field(moon, "on").unwrap());
+    graph.connect(from, to, Strength::Strong).unwrap();
+    graph.evaluate(0.0, &mut NoHost);
+    assert!(!graph.get::<bool>(to).unwrap());
 }
