@@ -132,10 +132,7 @@ fn pipeline(
         (Pass::Exempt, _) => "nothing",
     };
     let fills_depth = matches!(pass, Pass::Base | Pass::Visibility);
-    let adds = matches!(
-        pass,
-        Pass::Add | Pass::AddInShadow | Pass::VisibilityAdd | Pass::AddSoft | Pass::VisibilitySoft
-    );
+    let adds = matches!(pass, Pass::Add | Pass::AddInShadow | Pass::VisibilityAdd | Pass::AddSoft | Pass::VisibilitySoft);
     let depth_compare = if adds || pass == Pass::Exempt { wgpu::CompareFunction::Equal } else { wgpu::CompareFunction::Greater };
     let sum = |dst_factor| wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,

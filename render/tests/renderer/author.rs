@@ -116,7 +116,9 @@ fn our_own_functions_give_our_own_picture() {
 fn each_function_is_asked() {
     let half = "vec3<f32>(0.5)";
     let lit = 0.5f32.sqrt() * 0.5;
-    let rows: [(&str, String, &[(&str, ShaderParam)], [f32; 3]); 8] = [
+    /// Name, text, parameters, linear RGB.
+    type Row<'a> = (&'a str, String, &'a [(&'a str, ShaderParam)], [f32; 3]);
+    let rows: [Row<'_>; 8] = [
         ("none", "fn surface(s: Surface) -> Surface { return s; }".into(), &[], [lit + 0.05; 3]),
         (
             "surface",
