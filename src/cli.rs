@@ -44,6 +44,22 @@ pub(crate) enum Command {
     Doctor(Doctor),
     /// Prints the reference of node types
     Nodes(Nodes),
+    /// Evaluates a world and publishes its frames to displays in other processes
+    #[cfg(feature = "cluster")]
+    Serve(Serve),
+    /// Shows displays of a world that another process serves, frame by frame together with all others
+    ///
+    /// Comes back by itself after a break of the line or a restart of the application.
+    #[cfg(feature = "cluster")]
+    Display(Display),
+    /// Serves a world to one process per display on this machine, breaks things, and compares pictures
+    ///
+    /// Exit status: 0 all went well, 2 pictures or values differ, 1 it could not be run.
+    #[cfg(feature = "cluster")]
+    Cluster(Cluster),
+    /// Makes an authority and certificates for an application and its displays
+    #[cfg(feature = "cluster")]
+    Certs(Certs),
 }
 
 #[derive(Args, Debug)]
@@ -204,6 +220,144 @@ pub(crate) struct Nodes {
     /// Write definitions for editors of rhai scripts into this folder
     #[arg(long, conflicts_with = "name")]
     pub(crate) definitions: Option<PathBuf>,
+}
+
+/// How links between processes are protected.
+#[cfg(feature = "cluster")]
+#[derive(Args, Debug)]
+pub(crate) struct Link {
+    /// Folder of certificates that `umbriel certs` made, for tls/
+    #[arg(long)]
+    pub(crate) certificates: Option<PathBuf>,
+    /// Allow connections from other machines without encryption
+    #[arg(long, conflicts_with = "certificates")]
+    pub(crate) plain: bool,
+}
+
+#[cfg(feature = "cluster")]
+#[derive(Args, Debug)]
+pub(crate) struct Serve {
+    /// A world (.rhai) or a model (.gltf, .glb)
+    pub(crate) path: PathBuf,
+    /// Where displays connect to
+    #[arg(long, default_value = "tcp/127.0.0.1:7447")]
+    pub(crate) listen: String,
+    #[command(flatten)]
+    pub(crate) link: Link,
+    /// Frames per second
+    #[arg(long, default_value_t = 60.0, value_parser = positive)]
+    pub(crate) fps: f64,
+    /// End after so many frames
+    #[arg(long)]
+    pub(crate) frames: Option<u64>,
+    /// Begin once so many displays have drawn the first frame
+    #[arg(long, default_value_t = 0)]
+    pub(crate) wait_for: usize,
+    /// How long a frame waits for a display, in milliseconds
+    #[arg(long, default_value_t = 200)]
+    pub(crate) timeout_ms: u64,
+}
+
+#[cfg(feature = "cluster")]
+#[derive(Args, Debug)]
+pub(crate) struct Display {
+    /// Where the application listens
+    #[arg(long, default_value = "tcp/127.0.0.1:7447")]
+    pub(crate) connect: String,
+    /// The display or viewpoint, by name; `NAME/2` is its third channel alone
+    #[arg(long)]
+    pub(crate) show: String,
+    #[command(flatten)]
+    pub(crate) link: Link,
+    /// Folder that the world's pictures lie in
+    #[arg(long, default_value = ".")]
+    pub(crate) assets: PathBuf,
+    /// Draw without a window, which is how displays draw
+    #[arg(long, required = true)]
+    pub(crate) headless: bool,
+    /// File for each frame that is shown; the number is put before `.png`
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// End when the application ends, instead of waiting for it to come back
+    #[arg(long)]
+    pub(crate) once: bool,
+    /// Change a value of the replica after this frame: a test of what is done about it
+    #[arg(long, hide = true)]
+    pub(crate) corrupt: Option<u64>,
+}
+
+#[cfg(feature = "cluster")]
+#[derive(Args, Debug)]
+pub(crate) struct Cluster {
+    /// A world (.rhai) or a model (.gltf, .glb)
+    pub(crate) path: PathBuf,
+    /// Compare every picture with a render in this process, pixel by pixel
+    #[arg(long)]
+    pub(crate) check: bool,
+    /// Break something: kill, freeze, delay, loss or partition, at a frame, of a display, such as freeze@30:wall
+    #[arg(long, value_parser = fault)]
+    pub(crate) fault: Vec<Fault>,
+    /// One process for each channel of a display, instead of one for each display
+    #[arg(long)]
+    pub(crate) channels: bool,
+    /// Frames to show
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) frames: u64,
+    /// Frames per second
+    #[arg(long, default_value_t = 60.0, value_parser = positive)]
+    pub(crate) fps: f64,
+    /// How long a frame waits for a display, in milliseconds; otherwise 200 with faults, and a minute without
+    #[arg(long)]
+    pub(crate) timeout_ms: Option<u64>,
+    /// Change a value in the first display's replica after this frame
+    #[arg(long)]
+    pub(crate) corrupt: Option<u64>,
+    /// Folder for the pictures; otherwise one that is removed at the end
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+}
+
+#[cfg(feature = "cluster")]
+#[derive(Args, Debug)]
+pub(crate) struct Certs {
+    /// The folder to write
+    pub(crate) folder: PathBuf,
+}
+
+/// What is broken, when, and whose.
+#[cfg(feature = "cluster")]
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Fault {
+    pub(crate) kind: FaultKind,
+    pub(crate) frame: u64,
+    pub(crate) display: String,
+}
+
+/// How something breaks.
+#[cfg(feature = "cluster")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FaultKind {
+    /// The process ends, and is started again
+    Kill,
+    /// The process stands still for a second
+    Freeze,
+    /// The line is 30 ms slower each way for a second
+    Delay,
+    /// One piece of a hundred is lost and sent again, for a second
+    Loss,
+    /// Nothing goes through the line for a second
+    Partition,
+}
+
+#[cfg(feature = "cluster")]
+fn fault(text: &str) -> Result<Fault, String> {
+    let parsed = text.split_once('@').and_then(|(kind, rest)| {
+        let (frame, display) = rest.split_once(':')?;
+        Some(Fault { kind: FaultKind::from_str(kind, true).ok()?, frame: frame.parse().ok()?, display: display.into() })
+    });
+    parsed.ok_or_else(|| {
+        "expected KIND@FRAME:DISPLAY, such as freeze@30:wall; kinds are kill, freeze, delay, loss, partition".into()
+    })
 }
 
 /// How a light casts shadows.

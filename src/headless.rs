@@ -142,7 +142,7 @@ pub(crate) fn progress(length: u32, unit: &str) -> ProgressBar {
 }
 
 /// `out.png`, `out.wall.png`, `out.0007.png`, `out.wall.0007.png`.
-fn numbered(out: &Path, picture: Option<&str>, frame: Option<u32>) -> PathBuf {
+pub(crate) fn numbered(out: &Path, picture: Option<&str>, frame: Option<u32>) -> PathBuf {
     let mut name = out.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     for part in [picture.map(file_name), frame.map(|f| format!("{f:04}"))].into_iter().flatten() {
         name = format!("{name}.{part}");

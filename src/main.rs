@@ -1,6 +1,8 @@
 //! The `umbriel` command: shows worlds written in rhai and models, in windows or in files, and scores their shadows.
 
 mod cli;
+#[cfg(feature = "cluster")]
+mod cluster;
 mod doctor;
 mod headless;
 mod model;
@@ -31,7 +33,9 @@ fn main() -> ExitCode {
     };
     let filter = tracing_subscriber::EnvFilter::try_from_default_env();
     tracing_subscriber::fmt()
-        .with_env_filter(filter.unwrap_or_else(|_| "warn,umbriel_scripts=info,wgpu_hal=error,wgpu_core=error,naga=error".into()))
+        .with_env_filter(filter.unwrap_or_else(|_| {
+            "warn,umbriel_scripts=info,umbriel_displays=info,zenoh=error,wgpu_hal=error,wgpu_core=error,naga=error".into()
+        }))
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .without_time()
@@ -47,6 +51,14 @@ fn main() -> ExitCode {
         Command::Nodes(cli::Nodes { definitions: Some(folder), .. }) => {
             nodes::write_definitions(folder).map(|text| print(&text)).map_err(|e| format!("{}: {e}", folder.display()).into())
         }
+        #[cfg(feature = "cluster")]
+        Command::Serve(args) => cluster::serve(args),
+        #[cfg(feature = "cluster")]
+        Command::Display(args) => cluster::display(args),
+        #[cfg(feature = "cluster")]
+        Command::Cluster(args) => cluster::run(args),
+        #[cfg(feature = "cluster")]
+        Command::Certs(args) => cluster::certificates(args).map(|text| print(&text)),
         Command::Nodes(args) => nodes::reference(args.name.as_deref()).map(|text| print(&text)).map_err(Into::into),
     };
     match result {

@@ -99,12 +99,17 @@ impl Session {
                 let _ = world.graph_mut().set_named(light, "shadow_update", "none");
             }
         }
+        self.evaluate(time_s);
+        self.extract();
+    }
+
+    /// Runs one frame of the world, for those who do not draw it.
+    pub(crate) fn evaluate(&mut self, time_s: f64) {
         self.problems.extend(self.source.step(time_s));
         if let Some(Err(error)) = self.recording.as_mut().map(|r| r.frame(self.source.graph_mut())) {
             self.problems.push(format!("the recording ends here: {error}"));
             self.recording = None;
         }
-        self.extract();
     }
 
     /// Has a recording been played to its end?
@@ -157,6 +162,12 @@ impl Session {
     /// The graph.
     pub(crate) fn graph(&self) -> &Graph {
         self.source.graph()
+    }
+
+    /// The graph, to be written between frames.
+    #[cfg(feature = "cluster")]
+    pub(crate) fn graph_mut(&mut self) -> &mut Graph {
+        self.source.graph_mut()
     }
 
     /// The viewpoints of the world, in tree order.

@@ -5,3 +5,26 @@
 //! their messages, on zenoh, and exists with the cargo feature `cluster`.
 
 pub mod lock;
+
+#[cfg(feature = "cluster")]
+mod certificates;
+#[cfg(feature = "cluster")]
+mod follower;
+#[cfg(feature = "cluster")]
+mod host;
+#[cfg(feature = "cluster")]
+mod message;
+#[cfg(feature = "cluster")]
+mod proxy;
+#[cfg(feature = "cluster")]
+mod transport;
+
+#[cfg(feature = "cluster")]
+pub use self::{
+    certificates::make as make_certificates,
+    follower::{Follower, FollowerReport, Screen},
+    host::{Host, HostOptions, HostReport},
+    message::Input,
+    proxy::Proxy,
+    transport::{ClusterError, Security},
+};

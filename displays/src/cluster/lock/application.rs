@@ -79,6 +79,11 @@ impl ApplicationLock {
         self.members.iter().filter(|(_, member)| member.is_live).map(|(id, _)| *id)
     }
 
+    /// How many displays have drawn the last frame, waited for or not.
+    pub fn in_time(&self) -> usize {
+        self.members.values().filter(|member| member.ready == self.frame).count()
+    }
+
     /// Takes an event at a time; gives what is to be done, in order.
     pub fn step(&mut self, now_us: TimeUs, event: ApplicationEvent) -> Vec<ApplicationAction> {
         let mut actions = Vec::new();

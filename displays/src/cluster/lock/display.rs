@@ -190,7 +190,7 @@ impl DisplayLock {
 
     /// Does what can be done next.
     fn advance(&mut self, now_us: TimeUs, actions: &mut Vec<DisplayAction>) {
-        if self.is_applying || self.drawing.is_some() || self.epoch == 0 {
+        if self.is_applying || self.drawing.is_some() {
             return;
         }
         let Some(applied) = self.applied else { return self.fetch(now_us, actions) };

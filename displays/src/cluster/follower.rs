@@ -1,0 +1,404 @@
+//! A display's end: follows the application's frames, has them drawn, and shown on release.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use crossbeam::channel::{Receiver, Sender, unbounded};
+use umbriel_fields::replica::{Bulk, Packet, Replica};
+use umbriel_fields::{Graph, TypeRegistry};
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::{Publisher as ZenohPublisher, Subscriber};
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::sample::SampleKind;
+use zenoh::{Session, Wait};
+
+use super::lock::{DisplayAction, DisplayEvent, DisplayLock};
+use super::message::{
+    APPLICATION, BULK, DISPLAY, FRAME, INPUT, Input, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, bytes_of,
+    message_of, unstamped,
+};
+use super::transport::{ClusterError, End, Security, open};
+
+/// Draws and shows what a follower follows.
+pub trait Screen {
+    /// What can go wrong with drawing.
+    type Error: std::fmt::Display + From<ClusterError>;
+    /// Draws the graph, but does not show it. `is_new` is true where the graph is another one than at the last call.
+    fn draw(&mut self, graph: &Graph, frame: u64, is_new: bool) -> Result<(), Self::Error>;
+    /// Shows what was drawn last.
+    fn show(&mut self, frame: u64) -> Result<(), Self::Error>;
+}
+
+/// What happened to a display.
+#[derive(Clone, Debug, Default)]
+pub struct FollowerReport {
+    /// Frames shown.
+    pub shown: u64,
+    /// Snapshots that were fetched.
+    pub snapshots: u64,
+    /// Differences that were found, and repaired before anything was shown.
+    pub differences: Vec<String>,
+    /// The longest time between two frames that were shown, milliseconds.
+    pub longest_gap_ms: f64,
+}
+
+enum Arrived {
+    Frame(Vec<u8>),
+    Release(Vec<u8>),
+    Snapshot(Result<Vec<u8>, String>),
+    Bulk(u64, Result<Vec<u8>, String>),
+    Application(bool),
+}
+
+/// What waits for long values before it is told.
+enum Parked {
+    Frame(u64, u64),
+    Snapshot(u64, u64),
+}
+
+/// A display process in the lock.
+pub struct Follower {
+    session: Session,
+    name: String,
+    number: u64,
+    types: TypeRegistry,
+    ready: ZenohPublisher<'static>,
+    input: ZenohPublisher<'static>,
+    inputs: u64,
+    arrived: Receiver<Arrived>,
+    sender: Sender<Arrived>,
+    lock: DisplayLock,
+    replica: Option<Replica>,
+    /// One that differs from the application, until it is known where.
+    doubted: Option<Replica>,
+    is_new: bool,
+    bulk: Bulk,
+    asked: BTreeSet<u64>,
+    parked: VecDeque<Parked>,
+    packets: BTreeMap<u64, Vec<u8>>,
+    snapshot: Vec<u8>,
+    started: Instant,
+    last_shown: Option<Instant>,
+    refused_since: Option<Instant>,
+    /// Ends when the application does, instead of waiting for it to come back.
+    pub ends_with_application: bool,
+    is_over: bool,
+    report: FollowerReport,
+    _held: (Vec<Subscriber<()>>, LivelinessToken),
+}
+
+fn network(error: zenoh::Error) -> ClusterError {
+    ClusterError::Network(error.to_string())
+}
+
+/// A display that crashed and comes back at once finds its own name taken until its old link is given up.
+const NAME_IS_FREE_AFTER: Duration = Duration::from_secs(4);
+
+impl Follower {
+    /// Joins the application at an address, now or as soon as it is there. `name` is that of the display; `types` are those that can
+    /// be drawn.
+    pub fn connect(
+        endpoint: &str,
+        security: &Security,
+        name: &str,
+        types: impl Into<TypeRegistry>,
+    ) -> Result<Follower, ClusterError> {
+        let session = open(endpoint, security, End::Display)?;
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
+        let number = since ^ (std::process::id() as u64) << 40;
+        let (sender, arrived) = unbounded();
+        let mut subscribers = Vec::new();
+        for (key, kind) in [(FRAME, Arrived::Frame as fn(Vec<u8>) -> Arrived), (RELEASE, Arrived::Release)] {
+            let sender = sender.clone();
+            let take = move |sample: zenoh::sample::Sample| drop(sender.send(kind(sample.payload().to_bytes().into_owned())));
+            subscribers.push(session.declare_subscriber(key).callback(take).wait().map_err(network)?);
+        }
+        let application = sender.clone();
+        let alive = session.liveliness().declare_subscriber(APPLICATION).history(true).callback(move |sample| {
+            let _ = application.send(Arrived::Application(sample.kind() == SampleKind::Put));
+        });
+        subscribers.push(alive.wait().map_err(network)?);
+        let declare = |key: &'static str| {
+            let publisher = session.declare_publisher(key).congestion_control(CongestionControl::Drop);
+            publisher.priority(Priority::RealTime).express(true).wait().map_err(network)
+        };
+        let (ready, input) = (declare(READY)?, declare(INPUT)?);
+        let token = session.liveliness().declare_token(format!("{DISPLAY}/{number}")).wait().map_err(network)?;
+        Ok(Follower {
+            session,
+            name: name.into(),
+            number,
+            types: types.into(),
+            ready,
+            input,
+            inputs: 0,
+            arrived,
+            sender,
+            lock: DisplayLock::new(),
+            replica: None,
+            doubted: None,
+            is_new: true,
+            bulk: Bulk::new(),
+            asked: BTreeSet::new(),
+            parked: VecDeque::new(),
+            packets: BTreeMap::new(),
+            snapshot: Vec::new(),
+            started: Instant::now(),
+            last_shown: None,
+            refused_since: None,
+            ends_with_application: false,
+            is_over: false,
+            report: FollowerReport::default(),
+            _held: (subscribers, token),
+        })
+    }
+
+    /// What happened so far.
+    pub fn report(&self) -> &FollowerReport {
+        &self.report
+    }
+
+    /// True once the application said that it ends.
+    pub fn is_over(&self) -> bool {
+        self.is_over
+    }
+
+    /// True once anything came from an application.
+    pub fn found_application(&self) -> bool {
+        self.lock.epoch() > 0
+    }
+
+    /// The replica, for tests that corrupt it.
+    pub fn replica_mut(&mut self) -> Option<&mut Replica> {
+        self.replica.as_mut()
+    }
+
+    /// Tells the application of something that happened here.
+    pub fn tell(&mut self, node: &str, field: &str, value: &str) -> Result<(), ClusterError> {
+        self.inputs += 1;
+        let [node, field, value] = [node, field, value].map(String::from);
+        let input = Input { display: self.name.clone(), number: self.inputs, node, field, value };
+        self.input.put(bytes_of(&input)).wait().map_err(network)
+    }
+
+    /// Handles what comes within some time.
+    pub fn run<S: Screen>(&mut self, screen: &mut S, patience: Duration) -> Result<(), S::Error> {
+        let until = Instant::now() + patience;
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            if let Ok(arrived) = self.arrived.recv_timeout(left.min(Duration::from_millis(5))) {
+                self.handle(arrived, screen)?;
+            }
+            self.step(DisplayEvent::Tick, screen)?;
+            if left.is_zero() || self.is_over {
+                return Ok(());
+            }
+        }
+    }
+
+    fn handle<S: Screen>(&mut self, arrived: Arrived, screen: &mut S) -> Result<(), S::Error> {
+        match arrived {
+            Arrived::Frame(bytes) => match unstamped(&bytes).map(|(epoch, packet)| (epoch, Packet::read(packet))) {
+                Some((epoch, Ok(packet))) => {
+                    let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
+                    if epoch > self.lock.epoch() {
+                        self.packets.clear();
+                        self.parked.clear();
+                        self.step(DisplayEvent::Release { epoch, frame: 0, is_mine: false }, screen)?;
+                    }
+                    self.ask(missing);
+                    if epoch == self.lock.epoch() {
+                        self.packets.insert(frame, bytes);
+                        self.parked.push_back(Parked::Frame(epoch, frame));
+                    }
+                }
+                // What is damaged is a gap: a snapshot closes it.
+                Some((_, Err(error))) => tracing::error!("a frame cannot be used: {error}"),
+                None => tracing::error!("a frame cannot be used: it is empty"),
+            },
+            Arrived::Release(bytes) => match message_of::<Release>(&bytes) {
+                Ok(release) => {
+                    let is_mine = release.may_show.contains(&self.number);
+                    self.unpark(screen)?;
+                    self.step(DisplayEvent::Release { epoch: release.epoch, frame: release.frame, is_mine }, screen)?;
+                    self.is_over |= self.ends_with_application && release.is_last && release.epoch == self.lock.epoch();
+                }
+                Err(error) => tracing::error!("{error}"),
+            },
+            Arrived::Snapshot(Ok(bytes)) => {
+                self.refused_since = None;
+                let (epoch, packet) = unstamped(&bytes).ok_or_else(|| ClusterError::Message("a snapshot is empty".into()))?;
+                let packet = Packet::read(packet).map_err(ClusterError::from)?;
+                let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
+                self.ask(missing);
+                self.snapshot = bytes;
+                self.parked.retain(|parked| matches!(parked, Parked::Frame(..)));
+                self.parked.push_front(Parked::Snapshot(epoch, frame));
+            }
+            Arrived::Snapshot(Err(reason)) if reason.starts_with("there is a display") => {
+                let since = *self.refused_since.get_or_insert_with(Instant::now);
+                if since.elapsed() > NAME_IS_FREE_AFTER {
+                    return Err(ClusterError::Refused(reason).into());
+                }
+            }
+            Arrived::Snapshot(Err(reason)) if reason.starts_with("it ") => return Err(ClusterError::Refused(reason).into()),
+            Arrived::Snapshot(Err(reason)) => tracing::debug!("no snapshot: {reason}"),
+            Arrived::Bulk(hash, Ok(bytes)) => {
+                self.asked.remove(&hash);
+                if let Err(error) = self.bulk.learn(hash, &bytes) {
+                    tracing::error!("{error}");
+                }
+            }
+            Arrived::Bulk(hash, Err(reason)) => {
+                self.asked.remove(&hash);
+                tracing::debug!("no long value {hash:016x}: {reason}");
+                // What waits for it is of the past: a snapshot knows what is needed now.
+                self.parked.clear();
+            }
+            Arrived::Application(true) => {}
+            Arrived::Application(false) if self.ends_with_application => self.is_over = true,
+            Arrived::Application(false) => tracing::warn!("the application is gone; waiting for it to come back"),
+        }
+        self.unpark(screen)
+    }
+
+    /// Tells the lock what is complete, in order.
+    fn unpark<S: Screen>(&mut self, screen: &mut S) -> Result<(), S::Error> {
+        while let Some(parked) = self.parked.front() {
+            let bytes = match parked {
+                Parked::Frame(_, frame) => self.packets.get(frame),
+                Parked::Snapshot(..) => Some(&self.snapshot),
+            };
+            let packet = bytes.and_then(|bytes| unstamped(bytes)).and_then(|(_, packet)| Packet::read(packet).ok());
+            if packet.is_some_and(|packet| !packet.missing(&self.bulk).is_empty()) {
+                return Ok(());
+            }
+            match self.parked.pop_front() {
+                Some(Parked::Frame(epoch, frame)) => self.step(DisplayEvent::Frame { epoch, frame }, screen)?,
+                Some(Parked::Snapshot(epoch, frame)) => self.step(DisplayEvent::Snapshot { epoch, frame }, screen)?,
+                None => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn ask(&mut self, missing: Vec<u64>) {
+        for hash in missing {
+            if self.asked.insert(hash) {
+                self.get(format!("{BULK}/{hash:016x}"), Vec::new(), move |answer| Arrived::Bulk(hash, answer));
+            }
+        }
+    }
+
+    fn get(&self, key: String, payload: Vec<u8>, arrived: impl Fn(Result<Vec<u8>, String>) -> Arrived + Send + Sync + 'static) {
+        let sender = self.sender.clone();
+        let sent = self.session.get(key).payload(payload).timeout(Duration::from_secs(5)).callback(move |reply| {
+            let answer = match reply.into_result() {
+                Ok(sample) => Ok(sample.payload().to_bytes().into_owned()),
+                Err(error) => Err(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()),
+            };
+            let _ = sender.send(arrived(answer));
+        });
+        if let Err(error) = sent.wait() {
+            tracing::debug!("cannot ask: {error}");
+        }
+    }
+
+    fn step<S: Screen>(&mut self, event: DisplayEvent, screen: &mut S) -> Result<(), S::Error> {
+        let mut events = VecDeque::from([event]);
+        while let Some(event) = events.pop_front() {
+            let now_us = self.started.elapsed().as_micros() as u64;
+            for action in self.lock.step(now_us, event) {
+                match action {
+                    DisplayAction::Fetch => {
+                        let join = Join { protocol: PROTOCOL, display: self.number, name: self.name.clone() };
+                        self.get(SNAPSHOT.into(), bytes_of(&join), Arrived::Snapshot);
+                    }
+                    DisplayAction::Restore(frame) => {
+                        self.restore()?;
+                        self.packets = self.packets.split_off(&(frame + 1));
+                    }
+                    DisplayAction::Apply(frame) => events.push_back(self.apply(frame)?),
+                    DisplayAction::Draw(frame) => {
+                        if let Some(replica) = &self.replica {
+                            screen.draw(replica.graph(), frame, std::mem::take(&mut self.is_new))?;
+                        }
+                        events.push_back(DisplayEvent::Drawn(frame));
+                    }
+                    DisplayAction::Ready(frame) => {
+                        let hash = self.replica.as_ref().map_or(0, Replica::hash);
+                        let name = self.name.clone();
+                        let ready = Ready { display: self.number, name, epoch: self.lock.epoch(), frame, hash };
+                        if let Err(error) = self.ready.put(bytes_of(&ready)).wait() {
+                            tracing::debug!("cannot say ready: {error}");
+                        }
+                    }
+                    DisplayAction::Show(frame) => {
+                        screen.show(frame)?;
+                        self.note_shown();
+                    }
+                    DisplayAction::Forget => self.packets.clear(),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn note_shown(&mut self) {
+        let now = Instant::now();
+        if let Some(last) = self.last_shown.replace(now) {
+            let gap_ms = (now - last).as_secs_f64() * 1e3;
+            self.report.longest_gap_ms = self.report.longest_gap_ms.max(gap_ms);
+        }
+        self.report.shown += 1;
+    }
+
+    /// Makes the replica anew. Where the old one was doubted, what differs is told.
+    fn restore(&mut self) -> Result<(), ClusterError> {
+        let bytes = std::mem::take(&mut self.snapshot);
+        let (_, packet) = unstamped(&bytes).ok_or_else(|| ClusterError::Message("a snapshot is empty".into()))?;
+        let mut fresh = Replica::new(&Packet::read(packet)?, self.types.clone(), &self.bulk)?;
+        for name in fresh.unknown_types() {
+            tracing::info!(
+                "the application's node type `{name}` is not known here: its nodes are held, and nothing is drawn for them"
+            );
+        }
+        if let Some(doubted) = self.doubted.take()
+            && doubted.frame() == fresh.frame()
+            && let Some(difference) = doubted.difference(&fresh)
+        {
+            tracing::error!("the world differed, {difference}");
+            self.report.differences.push(difference.to_string());
+        }
+        if !fresh.agrees() {
+            tracing::error!("the snapshot of frame {} is not what its hash says", fresh.frame());
+        }
+        self.report.snapshots += 1;
+        self.replica = Some(fresh);
+        self.is_new = true;
+        Ok(())
+    }
+
+    fn apply(&mut self, frame: u64) -> Result<DisplayEvent, ClusterError> {
+        let bytes = self.packets.remove(&frame).unwrap_or_default();
+        let Some(replica) = &mut self.replica else { return Ok(DisplayEvent::Diverged(frame)) };
+        let packet = unstamped(&bytes).map(|(_, packet)| Packet::read(packet));
+        let applied = match packet {
+            Some(Ok(packet)) => replica.apply(&packet, &self.bulk),
+            _ => return Ok(DisplayEvent::Diverged(frame)),
+        };
+        match applied {
+            Ok(()) if replica.agrees() => return Ok(DisplayEvent::Applied(frame)),
+            Ok(()) => {
+                tracing::warn!("frame {frame}: the world here is not that of the application; fetching it");
+                self.doubted = self.replica.take();
+            }
+            Err(error @ umbriel_fields::replica::ReplicaError::OtherField { .. }) => return Err(error.into()),
+            Err(error) => {
+                tracing::error!("frame {frame} cannot be applied: {error}");
+                self.replica = None;
+            }
+        }
+        Ok(DisplayEvent::Diverged(frame))
+    }
+}

@@ -1,0 +1,167 @@
+//! An application and displays in one process, over real links: joining, security, events, restarts.
+#![cfg(feature = "cluster")]
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use glam::Vec3;
+use umbriel_displays::cluster::{ClusterError, Follower, Host, HostOptions, Screen, Security, make_certificates};
+use umbriel_fields::Graph;
+use umbriel_scenegraph::{new_graph, node_types};
+
+/// Remembers where the world stood in each frame that was shown.
+#[derive(Default)]
+struct Seen {
+    drawn: f32,
+    shown: Vec<(u64, f32)>,
+}
+
+impl Screen for Seen {
+    type Error = ClusterError;
+    fn draw(&mut self, graph: &Graph, _frame: u64, _is_new: bool) -> Result<(), ClusterError> {
+        let world = graph.find("turner").expect("the world has it");
+        self.drawn = graph.get_named::<Vec3>(world, "translation").expect("a transform has it").x;
+        Ok(())
+    }
+    fn show(&mut self, frame: u64) -> Result<(), ClusterError> {
+        self.shown.push((frame, self.drawn));
+        Ok(())
+    }
+}
+
+fn types() -> Vec<umbriel_fields::NodeType> {
+    node_types().into_iter().chain(umbriel_fields::builtin_types()).collect()
+}
+
+fn free_port() -> u16 {
+    std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+fn certificates(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    assert_eq!(make_certificates(&folder).unwrap().len(), 5);
+    assert!(make_certificates(&folder).is_err(), "certificates in use are not replaced");
+    folder
+}
+
+/// Publishes frames until told to end, the first transform at x = frame.
+fn serve(endpoint: &str, security: Security, end: &AtomicBool) -> Host {
+    let mut graph = new_graph();
+    let turner = graph.create("Transform").unwrap();
+    graph.set_name(turner, "turner").unwrap();
+    let options = HostOptions { listen: endpoint.into(), security, timeout: Duration::from_millis(500) };
+    let mut host = Host::listen(&options).unwrap();
+    let mut frame = 0;
+    while !end.load(Ordering::Relaxed) {
+        frame += 1;
+        for input in host.inputs() {
+            let to = graph.find(&input.node).unwrap();
+            graph.set_named(to, &input.field, Vec3::splat(input.number as f32)).unwrap();
+        }
+        graph.set_named(turner, "translation", Vec3::splat(frame as f32)).unwrap();
+        host.frame(&graph, false);
+        host.wait_until(&graph, Instant::now() + Duration::from_millis(5));
+    }
+    host
+}
+
+/// Follows until `done` or for ten seconds.
+fn follow(follower: &mut Follower, seen: &mut Seen, mut done: impl FnMut(&mut Seen) -> bool) -> Result<bool, ClusterError> {
+    let started = Instant::now();
+    while !done(seen) {
+        if started.elapsed() > Duration::from_secs(10) {
+            return Ok(false);
+        }
+        follower.run(seen, Duration::from_millis(10))?;
+    }
+    Ok(true)
+}
+
+#[test]
+fn displays_follow_come_late_and_outlive_the_application() {
+    let endpoint = format!("tcp/127.0.0.1:{}", free_port());
+    let (first_end, second_end) = (AtomicBool::new(false), AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        let mut early = Follower::connect(&endpoint, &Security::Loopback, "early", types()).unwrap();
+        let first = scope.spawn(|| serve(&endpoint, Security::Loopback, &first_end));
+        let mut seen = Seen::default();
+        assert!(follow(&mut early, &mut seen, |seen| seen.shown.len() > 5).unwrap());
+        let mut late = Follower::connect(&endpoint, &Security::Loopback, "late", types()).unwrap();
+        let mut seen_late = Seen::default();
+        let both = Instant::now();
+        while seen_late.shown.len() < 5 && both.elapsed() < Duration::from_secs(10) {
+            early.run(&mut seen, Duration::from_millis(2)).unwrap();
+            late.run(&mut seen_late, Duration::from_millis(2)).unwrap();
+        }
+        assert!(seen_late.shown.len() >= 5);
+        assert!(seen.shown.iter().chain(&seen_late.shown).all(|(frame, x)| *x == *frame as f32), "{:?}", seen.shown);
+        // Its name is taken.
+        let mut twin = Follower::connect(&endpoint, &Security::Loopback, "late", types()).unwrap();
+        let refused = follow(&mut twin, &mut Seen::default(), |_| false);
+        assert!(matches!(&refused, Err(ClusterError::Refused(why)) if why.contains("`late`")), "{refused:?}");
+        first_end.store(true, Ordering::Relaxed);
+        let host = first.join().unwrap();
+        assert_eq!((host.report().disagreed, host.report().refused > 0), (0, true));
+        drop(host);
+        // Another run of the application, from frame 1 on.
+        let second = scope.spawn(|| serve(&endpoint, Security::Loopback, &second_end));
+        let before = seen.shown.len();
+        assert!(follow(&mut early, &mut seen, |seen| seen.shown.len() > before + 5).unwrap());
+        assert!(seen.shown[before..].iter().all(|(frame, x)| *x == *frame as f32), "{:?}", &seen.shown[before..]);
+        second_end.store(true, Ordering::Relaxed);
+        second.join().unwrap();
+    });
+}
+
+#[test]
+fn only_certificates_of_the_same_authority_are_let_in() {
+    let (ours, foreign) = (certificates("ours"), certificates("foreign"));
+    let port = free_port();
+    let endpoint = format!("tls/127.0.0.1:{port}");
+    let end = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let host = scope.spawn(|| serve(&endpoint, Security::Mutual(ours.clone()), &end));
+        let mut friend = Follower::connect(&endpoint, &Security::Mutual(ours.clone()), "friend", types()).unwrap();
+        let mut seen = Seen::default();
+        let is_in = follow(&mut friend, &mut seen, |seen| seen.shown.len() > 3).unwrap();
+        let mut strangers = [
+            Follower::connect(&endpoint, &Security::Mutual(foreign), "foreign", types()).unwrap(),
+            Follower::connect(&format!("tcp/127.0.0.1:{port}"), &Security::Loopback, "plain", types()).unwrap(),
+        ];
+        for stranger in &mut strangers {
+            stranger.run(&mut Seen::default(), Duration::from_millis(1500)).unwrap();
+            assert!(!stranger.found_application());
+        }
+        end.store(true, Ordering::Relaxed);
+        host.join().unwrap();
+        assert!(is_in, "a display with a certificate must be let in");
+    });
+}
+
+#[test]
+fn events_of_displays_reach_the_application_in_order() {
+    let endpoint = format!("tcp/127.0.0.1:{}", free_port());
+    let end = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let host = scope.spawn(|| serve(&endpoint, Security::Loopback, &end));
+        let mut display = Follower::connect(&endpoint, &Security::Loopback, "wall", types()).unwrap();
+        let mut seen = Seen::default();
+        assert!(follow(&mut display, &mut seen, |seen| seen.shown.len() > 3).unwrap());
+        for _ in 0..20 {
+            display.tell("turner", "scale", "(1, 1, 1)").unwrap();
+        }
+        let mut scale = 0.0;
+        let started = Instant::now();
+        while scale < 20.0 && started.elapsed() < Duration::from_secs(10) {
+            display.run(&mut seen, Duration::from_millis(10)).unwrap();
+            let Some(replica) = display.replica_mut() else { continue };
+            let node = replica.graph().find("turner").unwrap();
+            scale = replica.graph().get_named::<Vec3>(node, "scale").unwrap().x;
+        }
+        end.store(true, Ordering::Relaxed);
+        host.join().unwrap();
+        assert_eq!(scale, 20.0);
+    });
+}

@@ -1,0 +1,55 @@
+//! A display process.
+
+use super::screen::Canvas;
+use super::{Failure, security};
+use crate::cli;
+use std::time::{Duration, Instant};
+use umbriel_displays::cluster::{ClusterError, Follower};
+use umbriel_fields::{NodeType, TypeRegistry, builtin_types};
+
+/// How long a display that ends with its application waits for the first word of it.
+const PATIENCE_S: u64 = 60;
+
+/// Follows an application until it ends, or for ever.
+pub(crate) fn display(args: &cli::Display) -> Result<usize, Failure> {
+    let types: Vec<NodeType> = umbriel_scenegraph::node_types().into_iter().chain(builtin_types()).collect();
+    let mut canvas = Canvas::new(&args.show, &args.assets, args.out.as_deref())?;
+    let mut follower = Follower::connect(&args.connect, &security(&args.link), &args.show, TypeRegistry::from(types))?;
+    follower.ends_with_application = args.once;
+    let started = Instant::now();
+    let mut corrupt_after = args.corrupt;
+    while !follower.is_over() {
+        follower.run(&mut canvas, Duration::from_millis(50)).inspect_err(|_| println!("{}", summary(&follower)))?;
+        if args.once && !follower.found_application() && started.elapsed() > Duration::from_secs(PATIENCE_S) {
+            let hint = if args.link.certificates.is_some() { ", or it does not accept the certificate" } else { "" };
+            let (endpoint, seconds) = (args.connect.clone(), PATIENCE_S);
+            return Err(ClusterError::NoApplication { endpoint, seconds, hint }.into());
+        }
+        if corrupt_after.is_some_and(|frame| corrupt(&mut follower, frame)) {
+            corrupt_after = None;
+        }
+    }
+    println!("{}", summary(&follower));
+    Ok(0)
+}
+
+fn summary(follower: &Follower) -> String {
+    let report = follower.report();
+    let differences: Vec<String> = report.differences.iter().map(|difference| format!("; differed: {difference}")).collect();
+    format!(
+        "shown={} snapshots={} longest_gap_ms={:.1} differences={}{}",
+        report.shown,
+        report.snapshots,
+        report.longest_gap_ms,
+        report.differences.len(),
+        differences.concat()
+    )
+}
+
+/// Changes a value behind the application's back, once a frame has come.
+fn corrupt(follower: &mut Follower, frame: u64) -> bool {
+    let Some(replica) = follower.replica_mut().filter(|replica| replica.frame() >= frame) else { return false };
+    let graph = replica.graph_mut();
+    let victim = graph.nodes().find(|node| graph.field(*node, "translation").is_ok());
+    victim.is_some_and(|node| graph.set_named(node, "translation", glam::Vec3::splat(0.25)).is_ok())
+}

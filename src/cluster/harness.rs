@@ -1,0 +1,272 @@
+//! An application and its displays on one machine: faults, and pictures compared with a render in one process.
+
+use super::screen::{channel, file_of};
+use super::{Failure, serve};
+use crate::cli::{self, Fault, FaultKind};
+use crate::headless::DESKTOP_SIZE;
+use crate::png;
+use crate::session::Session;
+use std::collections::BTreeMap;
+use std::net::{SocketAddr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use umbriel_displays::WindowSizes;
+use umbriel_displays::cluster::{Host, HostOptions, Proxy, Security};
+use umbriel_render::{Gpu, Renderer};
+use umbriel_scene::Picture;
+
+/// How long a fault lasts, but for kill.
+const LASTS: Duration = Duration::from_secs(1);
+/// How long displays may take to come back.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A display process.
+struct Process {
+    show: String,
+    child: Child,
+    proxy: Option<Proxy>,
+}
+
+/// A fault that began.
+struct Open {
+    fault: Fault,
+    heals: Instant,
+    is_healed: bool,
+    /// Was the display out of the lock at all?
+    was_out: bool,
+}
+
+/// Runs everything; gives the number of pictures and values that differ.
+pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
+    let mut session = Session::open(&args.path)?;
+    let shows = shows(&args.path, args.channels)?;
+    for fault in args.fault.iter().filter(|fault| !shows.contains(&fault.display)) {
+        return Err(format!("there is no display `{}` to break; there are: {}", fault.display, shows.join(", ")).into());
+    }
+    let address = free_address()?;
+    let default_ms = if args.fault.is_empty() { 60_000 } else { 200 };
+    let options = HostOptions {
+        listen: format!("tcp/{address}"),
+        security: Security::Loopback,
+        timeout: Duration::from_millis(args.timeout_ms.unwrap_or(default_ms)),
+    };
+    let mut host = Host::listen(&options)?;
+    let folder = args.out.clone().unwrap_or_else(|| std::env::temp_dir().join(format!("umbriel-cluster-{}", std::process::id())));
+    let mut launcher = Launcher { args, address, folder: folder.clone() };
+    let mut processes: Vec<Process> =
+        shows.iter().enumerate().map(|(place, show)| launcher.start(show, place == 0)).collect::<Result<_, Failure>>()?;
+    let count = processes.len();
+    serve::begin(&mut session, &mut host, count, &mut || all_run(&mut processes))?;
+    let mut faults: Vec<Open> = Vec::new();
+    let mut rejoins = Vec::new();
+    let started = Instant::now();
+    let mut frame = 1;
+    let mut is_last = false;
+    while !is_last {
+        host.wait_until(session.graph(), started + Duration::from_secs_f64(frame as f64 / args.fps));
+        frame += 1;
+        // Frames after the last one that was asked for give everybody the time to come back.
+        let overdue = started.elapsed() > Duration::from_secs_f64(args.frames as f64 / args.fps) + PATIENCE;
+        is_last = frame >= args.frames && (faults.is_empty() || overdue);
+        for fault in args.fault.iter().filter(|fault| fault.frame == frame) {
+            faults.push(begin(fault, &mut processes, &mut launcher)?);
+        }
+        serve::step(&mut session, &mut host, (frame - 1) as f64 / args.fps, is_last);
+        let live = host.live();
+        for open in &mut faults {
+            heal(open, &processes)?;
+            let is_live = live.contains(&open.fault.display);
+            open.was_out |= !is_live;
+            let is_back = open.is_healed && is_live && (open.was_out || open.heals.elapsed() > LASTS);
+            if is_back {
+                rejoins.push((open.fault.clone(), open.was_out.then(|| open.heals.elapsed())));
+            }
+        }
+        faults.retain(|open| !rejoins.iter().any(|(fault, _)| *fault == open.fault));
+    }
+    println!("{}", serve::summary(&host));
+    for (fault, rejoin) in &rejoins {
+        let back = rejoin.map_or("never out of the lock".into(), |time| format!("back after {:.0} ms", time.as_secs_f64() * 1e3));
+        println!("{:?}@{}:{}: {back}", fault.kind, fault.frame, fault.display);
+    }
+    for open in &faults {
+        tracing::error!("display `{}` did not come back from {:?}", open.fault.display, open.fault.kind);
+    }
+    let disagreed = host.report().disagreed as usize + faults.len();
+    drop(host);
+    for process in processes {
+        let output = process.child.wait_with_output()?;
+        println!("{}: {}", process.show, String::from_utf8_lossy(&output.stdout).trim());
+    }
+    let different = if args.check { compare(args, &shows, &folder, frame)? } else { 0 };
+    if args.out.is_none() {
+        let _ = std::fs::remove_dir_all(&folder);
+    }
+    Ok(disagreed + different)
+}
+
+/// An error if a process has ended.
+fn all_run(processes: &mut [Process]) -> Result<(), Failure> {
+    for process in processes {
+        if let Some(status) = process.child.try_wait()? {
+            return Err(format!("display `{}` ended: {status}", process.show).into());
+        }
+    }
+    Ok(())
+}
+
+/// Starts display processes.
+struct Launcher<'a> {
+    args: &'a cli::Cluster,
+    address: SocketAddr,
+    folder: PathBuf,
+}
+
+impl Launcher<'_> {
+    fn start(&mut self, show: &str, is_first: bool) -> Result<Process, Failure> {
+        let is_broken = |fault: &&Fault| fault.display == show && !matches!(fault.kind, FaultKind::Kill | FaultKind::Freeze);
+        let proxy = self.args.fault.iter().find(is_broken).map(|_| Proxy::start(self.address)).transpose()?;
+        let port = proxy.as_ref().map_or(self.address.port(), Proxy::port);
+        Ok(Process { show: show.into(), child: self.spawn(show, port, is_first)?, proxy })
+    }
+
+    fn spawn(&self, show: &str, port: u16, is_first: bool) -> Result<Child, Failure> {
+        let assets = self.args.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut command = Command::new(std::env::current_exe()?);
+        command.args(["display", "--headless", "--once", "--show", show]);
+        command.args(["--connect", &format!("tcp/127.0.0.1:{port}")]).arg("--assets").arg(assets);
+        if self.args.check {
+            command.arg("--out").arg(self.folder.join(file_name(show)));
+        }
+        if let Some(frame) = self.args.corrupt.filter(|_| is_first) {
+            command.args(["--corrupt", &frame.to_string()]);
+        }
+        Ok(command.stdout(Stdio::piped()).spawn()?)
+    }
+}
+
+fn begin(fault: &Fault, processes: &mut [Process], launcher: &mut Launcher<'_>) -> Result<Open, Failure> {
+    let process = processes.iter_mut().find(|process| process.show == fault.display).ok_or("no such display")?;
+    let mut heals = Instant::now() + LASTS;
+    match (fault.kind, &process.proxy) {
+        (FaultKind::Kill, _) => {
+            process.child.kill()?;
+            process.child.wait()?;
+            let port = process.proxy.as_ref().map_or(launcher.address.port(), Proxy::port);
+            process.child = launcher.spawn(&process.show, port, false)?;
+            heals = Instant::now();
+        }
+        (FaultKind::Freeze, _) => signal(&process.child, "-STOP")?,
+        (FaultKind::Delay, Some(proxy)) => proxy.delay(Duration::from_millis(30)),
+        (FaultKind::Loss, Some(proxy)) => proxy.lose(10),
+        (FaultKind::Partition, Some(proxy)) => proxy.cut(LASTS),
+        (_, None) => return Err("this display has no proxy".into()),
+    }
+    tracing::info!("{:?} of `{}` at frame {}", fault.kind, fault.display, fault.frame);
+    Ok(Open { fault: fault.clone(), heals, is_healed: false, was_out: fault.kind == FaultKind::Kill })
+}
+
+fn heal(open: &mut Open, processes: &[Process]) -> Result<(), Failure> {
+    if open.is_healed || Instant::now() < open.heals {
+        return Ok(());
+    }
+    let process = processes.iter().find(|process| process.show == open.fault.display).ok_or("no such display")?;
+    if open.fault.kind == FaultKind::Freeze {
+        signal(&process.child, "-CONT")?;
+    }
+    if let Some(proxy) = &process.proxy {
+        proxy.delay(Duration::ZERO);
+        proxy.lose(0);
+    }
+    open.is_healed = true;
+    Ok(())
+}
+
+fn signal(child: &Child, signal: &str) -> Result<(), Failure> {
+    let status = Command::new("kill").args([signal, &child.id().to_string()]).status()?;
+    if status.success() { Ok(()) } else { Err(format!("kill {signal}: {status}").into()) }
+}
+
+/// An address of this machine on which nobody listens.
+fn free_address() -> Result<SocketAddr, Failure> {
+    Ok(TcpListener::bind("127.0.0.1:0")?.local_addr()?)
+}
+
+/// The displays of a world, or their channels.
+fn shows(path: &Path, channels: bool) -> Result<Vec<String>, Failure> {
+    let mut session = Session::open(path)?;
+    session.step(0.0);
+    let pictures = session.pictures(None, DESKTOP_SIZE, &WindowSizes::new())?;
+    if pictures.iter().any(|picture| picture.name == umbriel_displays::rig::DESKTOP) {
+        return Err(format!("{}: the world has no Display node", path.display()).into());
+    }
+    let names = |picture: &Picture| match channels {
+        true => (0..picture.views.len()).map(|place| format!("{}/{place}", picture.name)).collect(),
+        false => vec![picture.name.clone()],
+    };
+    Ok(pictures.iter().flat_map(names).collect())
+}
+
+fn file_name(show: &str) -> String {
+    format!("{}.png", show.replace('/', "-"))
+}
+
+/// Compares what displays showed with a render of all in this process; gives the number of pictures that differ or are missing.
+fn compare(args: &cli::Cluster, shows: &[String], folder: &Path, frames: u64) -> Result<usize, Failure> {
+    let mut session = Session::open(&args.path)?;
+    let gpu = Gpu::new(None)?;
+    let mut renderer = Renderer::new(&gpu)?;
+    let mut tally: BTreeMap<&str, (usize, usize, u8)> = BTreeMap::new();
+    for frame in 1..=frames {
+        session.step((frame - 1) as f64 / args.fps);
+        let files: Vec<(&String, PathBuf)> =
+            shows.iter().map(|show| (show, file_of(&folder.join(file_name(show)), frame))).collect();
+        if frame == 1 || files.iter().all(|(_, file)| !file.exists()) {
+            continue;
+        }
+        let pictures = session.pictures(None, DESKTOP_SIZE, &WindowSizes::new())?;
+        renderer.render(session.scene(), &pictures)?;
+        for (place, picture) in pictures.iter().enumerate() {
+            let whole = png::row(&renderer.read_back(place)?);
+            for (show, file) in &files {
+                let Some([x, y, width, height]) = part(picture, show) else { continue };
+                let Ok(shown) = image::open(file) else { continue };
+                let shown = shown.to_rgba8();
+                let entry = tally.entry(show.as_str()).or_default();
+                entry.0 += 1;
+                let line = |row: u32| ((y + row) * whole.width + x) as usize * 4;
+                let truth = (0..height).flat_map(|row| &whole.rgba[line(row)..line(row) + width as usize * 4]);
+                let differences = truth.zip(shown.as_raw()).map(|(a, b)| a.abs_diff(*b));
+                let largest =
+                    if (shown.width(), shown.height()) == (width, height) { differences.max().unwrap_or(0) } else { 255 };
+                entry.1 += (largest > 0) as usize;
+                entry.2 = entry.2.max(largest);
+            }
+        }
+    }
+    let mut wrong = 0;
+    for show in shows {
+        let (compared, different, largest) = tally.get(show.as_str()).copied().unwrap_or_default();
+        println!("{show}: {compared} pictures compared, {different} differ, largest difference {largest}/255");
+        wrong += different + (compared == 0) as usize;
+        if args.fault.is_empty() && compared as u64 + 1 != frames {
+            tracing::error!("{show}: {} of {} pictures are missing", frames - 1 - compared as u64, frames - 1);
+            wrong += 1;
+        }
+    }
+    Ok(wrong)
+}
+
+/// Where a display or a channel lies in the picture of its display.
+fn part(picture: &Picture, show: &str) -> Option<[u32; 4]> {
+    if picture.name == show {
+        let [width, height] = picture.size;
+        return Some([0, 0, width, height]);
+    }
+    let place = (0..picture.views.len()).find(|place| channel(picture, *place).is_some_and(|one| one.name == show))?;
+    match &picture.layout {
+        umbriel_scene::Layout::Tiles(tiles) => tiles.get(place).map(|tile| [tile.x, tile.y, tile.width, tile.height]),
+        _ => None,
+    }
+}

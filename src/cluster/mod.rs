@@ -1,0 +1,30 @@
+//! Worlds on many displays: the application, a display, and both on one machine to test them.
+
+mod display;
+mod harness;
+mod screen;
+mod serve;
+
+pub(crate) use display::display;
+pub(crate) use harness::run;
+pub(crate) use serve::serve;
+
+use crate::cli;
+use umbriel_displays::cluster::{Security, make_certificates};
+
+type Failure = Box<dyn std::error::Error>;
+
+fn security(link: &cli::Link) -> Security {
+    match &link.certificates {
+        Some(folder) => Security::Mutual(folder.clone()),
+        None if link.plain => Security::Plain,
+        None => Security::Loopback,
+    }
+}
+
+/// Makes certificates; gives the names of the files.
+pub(crate) fn certificates(args: &cli::Certs) -> Result<String, Failure> {
+    let files = make_certificates(&args.folder)?;
+    let names: Vec<String> = files.iter().map(|file| format!("{}\n", file.display())).collect();
+    Ok(names.concat() + "Give authority.pem, display.pem and display.key.pem to the machines of the displays; keep the rest.\n")
+}
