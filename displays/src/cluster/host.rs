@@ -74,12 +74,15 @@ enum Arrived {
     Gone(u64),
 }
 
+/// A question, and what is said to it.
+type Answer = (Query, Result<Arc<[u8]>, String>);
+
 /// An application that displays can join.
 pub struct Host {
     frames: ZenohPublisher<'static>,
     releases: ZenohPublisher<'static>,
     arrived: Receiver<Arrived>,
-    replies: Sender<(Query, Result<Arc<[u8]>, String>)>,
+    replies: Sender<Answer>,
     lock: ApplicationLock,
     publisher: Publisher,
     /// This run: later ones have greater numbers.
@@ -107,7 +110,7 @@ impl Host {
     pub fn listen(options: &HostOptions) -> Result<Host, ClusterError> {
         let session = open(&options.listen, &options.security, End::Application)?;
         let (sender, arrived) = unbounded();
-        let (replies, to_reply) = unbounded::<(Query, Result<Arc<[u8]>, String>)>();
+        let (replies, to_reply) = unbounded::<Answer>();
         // Long answers to slow displays must not hold up frames.
         std::thread::spawn(move || {
             for (query, answer) in to_reply {
