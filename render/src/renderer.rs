@@ -17,7 +17,7 @@ use crate::soft::{self, SoftJob, SoftPass};
 use crate::stats::{FrameStats, Problems};
 use crate::surface::{Pass, Surface};
 use crate::targets::{Target, ViewTargets};
-use crate::volumes::{VolumeJob, VolumePass};
+use crate::volumes::{Depth, VolumeJob, VolumePass};
 use crate::{Error, Gpu, buffer::GrowBuffer, gpu, jobs, surroundings, uniforms};
 use std::time::Instant;
 use umbriel_scene::{Material, Mesh, Picture, Scene, ShadowMethod};
@@ -57,7 +57,7 @@ impl Renderer {
             surface: Surface::new(device, &layouts),
             screen: Screen::new(device, &layouts),
             maps: Maps::new(device, &layouts),
-            volumes: VolumePass::new(device, gpu::DEPTH_FORMAT, gpu::SAMPLES, linear, &layouts.view),
+            volumes: VolumePass::new(device, Depth::Reversed, gpu::DEPTH_FORMAT, gpu::SAMPLES, linear, &layouts.view),
             soft: SoftPass::new(device, &layouts),
             deformer: Deformer::new(device),
             meshes: Slab::default(),

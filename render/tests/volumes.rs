@@ -11,7 +11,7 @@ mod truth;
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 use harness::{Gpu, Loaded, light};
 use shapes::{Thing, cuboid, exploded, inconsistent, merged, sheet, soup, sphere, three_blades};
-use umbriel_render::volumes::{VolumeDraws, VolumeLight};
+use umbriel_render::volumes::{Depth, VolumeDraws, VolumeLight};
 use umbriel_scene::{Frustum, Silhouettes, View, VolumeCounting, VolumeSettings};
 
 const SIZE: [u32; 2] = [128, 96];
@@ -183,22 +183,45 @@ impl Random {
 
 #[test]
 fn the_eye_anywhere() {
+    eyes(60, &mut both(), VolumeCounting::Auto);
+}
+
+/// As many positions as a long check wants: `cargo test -p umbriel-render --test volumes -- --ignored`.
+#[test]
+#[ignore = "minutes"]
+fn the_eye_in_six_hundred_places() {
+    eyes(600, &mut both(), VolumeCounting::Auto);
+}
+
+/// Depth that runs from 0 to 1 - epsilon (002), and depth that the device clamps.
+#[test]
+fn conventional_depth() {
+    eyes(
+        12,
+        &mut [(1, Gpu::with_depth(1, Depth::Conventional)), (4, Gpu::with_depth(4, Depth::Conventional))],
+        VolumeCounting::Auto,
+    );
+    eyes(6, &mut [(1, Gpu::with_depth(1, Depth::Clamped))], VolumeCounting::ZFail);
+}
+
+/// Views from places in and around volumes, under three lights, through windows aside.
+fn eyes(count: usize, gpus: &mut [(u32, Gpu)], counting: VolumeCounting) {
+    let settings = VolumeSettings { counting, ..VolumeSettings::default() };
     let mut casters = vec![
         cuboid(Vec3::new(0.9, 0.3, 0.8)).at(Vec3::Y * 2.0),
         cuboid(Vec3::new(0.5, 0.4, 0.5)).edited(|_, i| i.truncate(30)).at(Vec3::new(0.7, 0.6, -0.5)),
         sheet(0.7).at(Vec3::new(-0.9, 1.3, 0.3)),
     ];
     let mut random = Random(7);
-    let mut gpus = both();
     let mut total = Score::default();
-    for i in 0..60 {
+    for i in 0..count {
         let toward_light = [sun(), lamp(), Vec4::new(0.1, 3.0, 0.2, 1.0)][i % 3];
         let eye = random.around(Vec3::new(-0.2, 0.9, -0.2), Vec3::new(0.8, 0.85, 0.8));
         let at = random.around(Vec3::new(0.0, 0.3, 0.0), Vec3::splat(2.0));
         let near = [0.02, 0.1, 0.4][i / 3 % 3];
         let view = looking(eye, at, random.off_axis(near));
         casters.iter_mut().for_each(|c| c.bounds_known = i % 2 == 0);
-        let score = compare(&mut gpus, &casters, &room(), toward_light, &view);
+        let score = compare_under(gpus, &casters, &room(), VolumeLight { settings, ..light(toward_light) }, &view);
         let share = score.wrong as f64 / score.counted.max(1) as f64;
         assert!(share <= ALLOWED, "view {i} from {eye}: {} of {} wrong", score.wrong, score.counted);
         assert_eq!(score.inverted_frames, 0, "view {i} from {eye}");
@@ -206,7 +229,7 @@ fn the_eye_anywhere() {
         total.wrong += score.wrong;
         total.shadowed += score.shadowed;
     }
-    println!("60 eyes: {} of {} wrong, {} shadowed", total.wrong, total.counted, total.shadowed);
+    println!("{count} eyes: {} of {} wrong, {} shadowed", total.wrong, total.counted, total.shadowed);
     assert!(total.shadowed * 5 > total.counted);
 }
 

@@ -1,5 +1,6 @@
 //! Counts volumes into the stencil: both faces in one draw, in front of or behind what is seen.
 
+use super::Depth;
 use super::choose::Choice;
 use super::extract::{Lists, Piece};
 use super::parts::{GROUP_LAYERS, STENCIL_LAYERS};
@@ -27,6 +28,7 @@ const SHADOWED: u32 = 0x80;
 /// What the pipelines are drawn into.
 #[derive(Clone, Copy)]
 pub(super) struct Target {
+    pub(super) depth: Depth,
     pub(super) depth_stencil_format: wgpu::TextureFormat,
     pub(super) sample_count: u32,
     pub(super) colour_format: Option<wgpu::TextureFormat>,
@@ -79,8 +81,14 @@ pub(super) struct Drawing {
     remember: wgpu::RenderPipeline,
 }
 
-/// Reversed depth: what is behind or level with the visible surface fails, near caps on their own surface among it.
-///
+/// What is behind or level with the visible surface fails, near caps on their own surface among it.
+fn in_front(depth: Depth) -> CompareFunction {
+    match depth {
+        Depth::Reversed => CompareFunction::Greater,
+        Depth::Conventional | Depth::Clamped => CompareFunction::Less,
+    }
+}
+
 /// Counting behind what is seen, faces turned to the eye end a shadow that began behind them, so they count down (the
 /// mirror of 000's front state). Counting in front of it they begin one, so they count up.
 fn counting(write_mask: u32, z_fail: bool, turned: bool) -> wgpu::StencilState {
@@ -137,7 +145,7 @@ impl Drawing {
                         Some(Piece::TurnedCaps) => (&self.quads, "turned_cap"),
                         Some(Piece::FarCaps) => (&self.quads, "far_cap"),
                     };
-                    let made = pipeline(device, &self.target, program, entry, CompareFunction::Greater, stencil);
+                    let made = pipeline(device, &self.target, program, entry, in_front(self.target.depth), stencil);
                     self.counting.insert(kind, made);
                 }
             }
@@ -245,7 +253,7 @@ fn pipeline(
             compilation_options: Default::default(),
             buffers: &[],
         },
-        primitive: wgpu::PrimitiveState::default(),
+        primitive: wgpu::PrimitiveState { unclipped_depth: target.depth == Depth::Clamped, ..Default::default() },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: target.depth_stencil_format,
             depth_write_enabled: Some(false),

@@ -99,6 +99,21 @@ pub enum Surface {
     InParts,
 }
 
+/// How depth runs in the pass that volumes are drawn in. The far plane is at infinity; clip coordinates x, y and w are those
+/// of [`umbriel_scene::Frustum::clip_from_view`] in all of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Depth {
+    /// 1 at the near plane, 0 at infinity, where nothing is clipped.
+    #[default]
+    Reversed,
+    /// 0 at the near plane, 1 - epsilon at infinity (002): [`umbriel_scene::Frustum::clip_from_view_conventional`].
+    Conventional,
+    /// The same without epsilon: the device clamps what rounding takes beyond 1. Needs `DEPTH_CLIP_CONTROL`. What is in
+    /// front of the near plane is then not clipped but clamped to it, so all casters must be counted by z-fail
+    /// ([`umbriel_scene::VolumeCounting::ZFail`]).
+    Clamped,
+}
+
 /// What a frame's [`VolumePass::prepare`] did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VolumeStats {
@@ -153,13 +168,14 @@ impl VolumePass {
     /// samples, and one colour attachment of `colour_format` (none for `None`).
     pub fn new(
         device: &wgpu::Device,
+        depth: Depth,
         depth_stencil_format: wgpu::TextureFormat,
         sample_count: u32,
         colour_format: Option<wgpu::TextureFormat>,
         view_layout: &wgpu::BindGroupLayout,
     ) -> VolumePass {
         let layouts = draw::Layouts::new(device);
-        let target = draw::Target { depth_stencil_format, sample_count, colour_format };
+        let target = draw::Target { depth, depth_stencil_format, sample_count, colour_format };
         VolumePass {
             extract: extract::Extract::new(device, &layouts),
             drawing: draw::Drawing::new(device, target, view_layout, &layouts),
@@ -237,8 +253,8 @@ impl VolumePass {
     }
 
     /// Counts the volumes of a job into the stencil, which must be 0 in the viewport; afterwards it is 0 where the light
-    /// shines. Depth is read, stencil written, colour untouched; the stencil reference is changed. Depth is reversed,
-    /// with its far plane at infinity, and cleared to 0. `view` is the View uniform of the view that `sight` tells of;
+    /// shines. Depth is read, stencil written, colour untouched; the stencil reference is changed. Depth was cleared to
+    /// infinity. `view` is the View uniform of the view that `sight` tells of;
     /// the viewport is the whole target, of the view's size.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, job: usize, view: &wgpu::BindGroup, sight: &Sight) -> VolumeDraws {
         let mut draws = VolumeDraws::default();

@@ -2,7 +2,9 @@
 
 use crate::shapes::Thing;
 use glam::{Mat4, Vec4};
-use umbriel_render::volumes::{Sight, Surface, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats};
+use umbriel_render::volumes::{
+    Depth, Sight, Surface, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats,
+};
 use umbriel_scene::{Aabb, View, VolumeSettings};
 use wgpu::util::DeviceExt;
 
@@ -26,7 +28,7 @@ fn copy(@builtin(global_invocation_id) id: vec3<u32>) {
     if any(id.xy >= size) { return; }
     for (var s = 0; s < SAMPLES; s++) {
         // Where nothing is seen there is nothing to be in shadow.
-        let seen = textureLoad(depth, id.xy, s) > 0.0;
+        let seen = textureLoad(depth, id.xy, s) != NOTHING;
         copied[(id.y * size.x + id.x) * u32(SAMPLES) + u32(s)] = select(0u, textureLoad(stencil, id.xy, s).x, seen);
     }
 }
@@ -39,6 +41,7 @@ pub(crate) struct Gpu {
     pub(crate) queue: wgpu::Queue,
     pub(crate) pass: VolumePass,
     samples: u32,
+    depth: Depth,
     view_layout: wgpu::BindGroupLayout,
     object_layout: wgpu::BindGroupLayout,
     surface: wgpu::RenderPipeline,
@@ -81,10 +84,15 @@ impl Loaded {
 
 impl Gpu {
     pub(crate) fn new(samples: u32) -> Gpu {
+        Gpu::with_depth(samples, Depth::Reversed)
+    }
+
+    pub(crate) fn with_depth(samples: u32, depth: Depth) -> Gpu {
         let instance = wgpu::Instance::default();
         let adapter = pollster::block_on(instance.request_adapter(&Default::default())).expect("a graphics adapter");
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-            required_features: wgpu::Features::DEPTH32FLOAT_STENCIL8,
+            required_features: wgpu::Features::DEPTH32FLOAT_STENCIL8
+                | if depth == Depth::Clamped { wgpu::Features::DEPTH_CLIP_CONTROL } else { wgpu::Features::empty() },
             required_limits: adapter.limits(),
             ..Default::default()
         }))
@@ -107,10 +115,10 @@ impl Gpu {
         let (view_layout, object_layout) = (uniform("view"), uniform("object"));
         // The 4-sample pass has a colour attachment, the other has none.
         let colour = (samples > 1).then_some(COLOUR);
-        let pass = VolumePass::new(&device, FORMAT, samples, colour, &view_layout);
-        let surface = surface_pipeline(&device, samples, &view_layout, &object_layout);
-        let copy = copy_pipeline(&device, samples);
-        Gpu { device, queue, pass, samples, view_layout, object_layout, surface, copy }
+        let pass = VolumePass::new(&device, depth, FORMAT, samples, colour, &view_layout);
+        let surface = surface_pipeline(&device, (samples, depth), &view_layout, &object_layout);
+        let copy = copy_pipeline(&device, samples, depth);
+        Gpu { device, queue, pass, samples, depth, view_layout, object_layout, surface, copy }
     }
 
     pub(crate) fn load(&self, thing: &Thing) -> Loaded {
@@ -157,7 +165,12 @@ impl Gpu {
         view: &View,
     ) -> (Vec<u32>, VolumeStats, VolumeDraws) {
         let mut view_data = [0f32; 60];
-        let clip_from_world: Mat4 = view.frustum.clip_from_view() * view.view_from_world;
+        let clip_from_view = match self.depth {
+            Depth::Reversed => view.frustum.clip_from_view(),
+            Depth::Conventional => view.frustum.clip_from_view_conventional((-22f32).exp2()),
+            Depth::Clamped => view.frustum.clip_from_view_conventional(0.0),
+        };
+        let clip_from_world: Mat4 = clip_from_view * view.view_from_world;
         view_data[..16].copy_from_slice(&clip_from_world.to_cols_array());
         let view_group = self.uniform(&self.view_layout, bytemuck::cast_slice(&view_data));
         let target = self.texture(view, FORMAT);
@@ -203,7 +216,10 @@ impl Gpu {
             label: Some("surfaces"),
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: target,
-                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(nothing_seen(self.depth)),
+                    store: wgpu::StoreOp::Store,
+                }),
                 stencil_ops: None,
             }),
             ..Default::default()
@@ -258,7 +274,7 @@ impl Gpu {
 
 fn surface_pipeline(
     device: &wgpu::Device,
-    samples: u32,
+    (samples, depth): (u32, Depth),
     view_layout: &wgpu::BindGroupLayout,
     object_layout: &wgpu::BindGroupLayout,
 ) -> wgpu::RenderPipeline {
@@ -288,7 +304,11 @@ fn surface_pipeline(
         depth_stencil: Some(wgpu::DepthStencilState {
             format: FORMAT,
             depth_write_enabled: Some(true),
-            depth_compare: Some(wgpu::CompareFunction::Greater),
+            depth_compare: Some(if depth == Depth::Reversed {
+                wgpu::CompareFunction::Greater
+            } else {
+                wgpu::CompareFunction::Less
+            }),
             stencil: Default::default(),
             bias: Default::default(),
         }),
@@ -299,12 +319,18 @@ fn surface_pipeline(
     })
 }
 
-fn copy_pipeline(device: &wgpu::Device, samples: u32) -> wgpu::ComputePipeline {
+/// Depth where there is no surface.
+fn nothing_seen(depth: Depth) -> f32 {
+    if depth == Depth::Reversed { 0.0 } else { 1.0 }
+}
+
+fn copy_pipeline(device: &wgpu::Device, samples: u32, runs: Depth) -> wgpu::ComputePipeline {
     let texture = if samples == 1 { "texture_2d" } else { "texture_multisampled_2d" };
     let depth = if samples == 1 { "texture_depth_2d" } else { "texture_depth_multisampled_2d" };
     let index = if samples == 1 { "0" } else { "s" };
     let source = COPY
         .replace("TEXTURE", texture)
+        .replace("NOTHING", &format!("{:?}", nothing_seen(runs)))
         .replace("DEPTH", depth)
         .replace("SAMPLES", &samples.to_string())
         .replace("id.xy, s)", &format!("id.xy, {index})"));
