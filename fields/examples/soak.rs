@@ -2,13 +2,15 @@
 //!
 //! `cargo run --release -p umbriel-fields --example soak -- --operations 1000000 --seed 1 [--verify-every 10]`
 //!
-//! A graph that explains itself and evaluates on two threads has every operation too, and must hold the same after each frame.
+//! A twin that explains itself now and then and evaluates on two threads has every operation too, and must hold the same. Both are saved and
+//! loaded on the way, as text and as bytes in turns, and go on as what was loaded.
 
 use std::process::ExitCode;
 use std::time::Instant;
 
 use umbriel_fields::{
     Field, FieldId, Graph, Host, Mode, NoHost, NodeId, NodeType, ObserverId, RouteId, SetRule, Strength, Value,
+    save::{self, TakenNames},
 };
 
 /// splitmix64 (Steele, Lea, Flood 2014).
@@ -69,6 +71,8 @@ struct Soak {
     routes: Vec<RouteId>,
     observers: Vec<ObserverId>,
     counts: Counts,
+    threads: usize,
+    fault: Option<String>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -78,11 +82,14 @@ struct Counts {
     evaluated: usize,
     copied: usize,
     callbacks: usize,
+    saves: usize,
 }
 
 /// Operations inside of callbacks are few, and of the kinds that only the graph knows of.
 struct Callbacks<'a> {
     random: &'a mut Random,
+    nodes: &'a [NodeId],
+    routes: &'a mut Vec<RouteId>,
     callbacks: usize,
 }
 
@@ -95,6 +102,12 @@ impl Callbacks<'_> {
         match (self.random.below(100), route) {
             (0, Some(route)) => drop(graph.disconnect(route)),
             (1, _) => drop(graph.touch(field)),
+            (3, _) => {
+                let Some(node) = self.random.pick(self.nodes) else { return };
+                let strength = [Strength::Strong, Strength::Weak][self.random.below(2)];
+                let other = FieldId { node, ..field };
+                self.routes.extend(graph.connect(field, other, strength));
+            }
             (2, _) if self.random.below(20) == 0 => drop(graph.delete(node)),
             _ => drop(graph.set(field, value)),
         }
@@ -112,9 +125,11 @@ impl Host for Callbacks<'_> {
 }
 
 impl Soak {
-    fn new(seed: u64) -> Self {
+    fn new(seed: u64, threads: usize) -> Self {
         let (nodes, routes, observers) = (Vec::new(), Vec::new(), Vec::new());
-        Self { graph: Graph::new(types()), random: Random(seed), nodes, routes, observers, counts: Counts::default() }
+        let mut graph = Graph::new(types());
+        graph.set_threads(threads);
+        Self { graph, random: Random(seed), nodes, routes, observers, counts: Counts::default(), threads, fault: None }
     }
 
     fn field(&mut self) -> Option<FieldId> {
@@ -183,14 +198,42 @@ impl Soak {
                 self.frame();
                 Ok(())
             }
+            53 if field.index == 3 && other.index == 3 => {
+                self.save_and_load();
+                Ok(())
+            }
             _ => graph.set(field, value),
         };
         self.counts.refused += done.is_err() as usize;
         self.nodes.retain(|node| self.graph.contains(*node));
     }
 
+    /// What was loaded must say of itself what was saved, and goes on in place of the graph.
+    fn save_and_load(&mut self) {
+        self.counts.saves += 1;
+        let text = save::to_text(&self.graph);
+        let data = if self.counts.saves.is_multiple_of(2) { text.clone().into_bytes() } else { save::to_binary(&self.graph) };
+        let mut graph = Graph::new(types());
+        let loaded = match save::load_into(&mut graph, data, TakenNames::Refuse) {
+            Ok(loaded) => loaded,
+            Err(error) => return self.fault = Some(format!("what was saved does not load: {error}")),
+        };
+        if let Some(report) = loaded.reports.first() {
+            self.fault = Some(format!("what was saved does not load whole: {report}"));
+        } else if save::to_text(&graph) != text {
+            self.fault = Some("what was loaded is not what was saved".into());
+        }
+        graph.set_threads(self.threads);
+        graph.explain(self.graph.explains());
+        (self.graph, self.nodes) = (graph, loaded.nodes);
+        self.routes = self.graph.routes().map(|(route, _)| route).collect();
+        // Who observes is not saved.
+        self.observers.clear();
+    }
+
     fn frame(&mut self) {
-        let mut host = Callbacks { random: &mut self.random, callbacks: 0 };
+        let (random, nodes, routes) = (&mut self.random, &self.nodes[..], &mut self.routes);
+        let mut host = Callbacks { random, nodes, routes, callbacks: 0 };
         let report = self.graph.evaluate(self.counts.frames as f64 / 60.0, &mut host);
         self.counts.callbacks += host.callbacks;
         self.counts.frames += 1;
@@ -227,8 +270,7 @@ fn main() -> ExitCode {
         20 * verify_every
     );
     let start = Instant::now();
-    let [mut soak, mut twin] = [(); 2].map(|()| Soak::new(seed as u64));
-    twin.graph.set_threads(2);
+    let [mut soak, mut twin] = [1, 2].map(|threads| Soak::new(seed as u64, threads));
     let mut largest = (0, 0);
     for done in 1..=operations {
         soak.step();
@@ -238,7 +280,8 @@ fn main() -> ExitCode {
         }
         twin.step();
         largest = largest.max((soak.graph.node_count(), soak.graph.routes().count()));
-        let fault = if done % verify_every == 0 { soak.graph.verify_invariants().err() } else { None };
+        let broken = if done % verify_every == 0 { soak.graph.verify_invariants().err() } else { None };
+        let fault = broken.or(soak.fault.take()).or(twin.fault.take());
         let differs = done % (20 * verify_every) == 0 && (soak.hash() != twin.hash() || soak.counts != twin.counts);
         if let Some(fault) = fault.or(differs.then(|| "the twin on two threads holds other values".into())) {
             println!("operation {done}: {fault}");

@@ -8,13 +8,15 @@ pub(crate) struct BitSet {
     levels: Vec<Vec<u64>>,
     /// A member that is not among the bits, or `NONE`.
     held: usize,
+    /// How many bits are set.
+    bits: usize,
 }
 
 const NONE: usize = usize::MAX;
 
 impl Default for BitSet {
     fn default() -> Self {
-        Self { levels: Vec::new(), held: NONE }
+        Self { levels: Vec::new(), held: NONE, bits: 0 }
     }
 }
 
@@ -55,6 +57,7 @@ impl BitSet {
 
     #[inline]
     fn set_bit(&mut self, number: usize) {
+        self.bits += !self.has_bit(number) as usize;
         let mut at = number;
         for level in &mut self.levels {
             let word = &mut level[at / 64];
@@ -85,13 +88,6 @@ impl BitSet {
     #[inline]
     pub(crate) fn lowest(&self) -> Option<usize> {
         Some(self.held.min(self.lowest_bit())).filter(|lowest| *lowest != NONE)
-    }
-
-    /// The lowest number from one on.
-    pub(crate) fn next_from(&self, from: usize) -> Option<usize> {
-        let bit = self.next_bit(from);
-        let held = if self.held >= from { self.held } else { NONE };
-        Some(bit.min(held)).filter(|next| *next != NONE)
     }
 
     /// The lowest bit from one on, or `NONE`: up until a word has one, and down again.
@@ -126,6 +122,62 @@ impl BitSet {
         if self.levels.is_empty() { NONE } else { at }
     }
 
+    /// How many members there are.
+    #[inline]
+    pub(crate) fn len(&self) -> usize {
+        self.bits + (self.held != NONE) as usize
+    }
+
+    /// Calls a function with each member below a number, in order.
+    pub(crate) fn members_below(&self, end: usize, mut each: impl FnMut(usize)) {
+        let mut held = Some(self.held).filter(|held| *held < end);
+        self.words_below(end, |first, word| {
+            let mut rest = word;
+            while rest != 0 {
+                let number = first + rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                if let Some(held) = held.take_if(|held| *held < number) {
+                    each(held);
+                }
+                each(number);
+            }
+        });
+        held.into_iter().for_each(each);
+    }
+
+    /// Takes those out that are below a number and fit.
+    pub(crate) fn remove_below(&mut self, end: usize, fits: impl Fn(usize) -> bool) {
+        if self.held < end && fits(self.held) {
+            self.held = NONE;
+        }
+        let mut words = Vec::new();
+        self.words_below(end, |first, word| words.push((first, word)));
+        for (first, word) in words {
+            let gone = (0..64).filter(|bit| word >> bit & 1 == 1 && fits(first + bit)).fold(0u64, |gone, bit| gone | 1 << bit);
+            self.levels[0][first / 64] &= !gone;
+            self.bits -= gone.count_ones() as usize;
+            let mut at = first / 64;
+            for height in 1..self.levels.len() {
+                if self.levels[height - 1][at] != 0 {
+                    break;
+                }
+                self.levels[height][at / 64] &= !(1 << (at % 64));
+                at /= 64;
+            }
+        }
+    }
+
+    /// Calls a function with the words that have members below a number: the number of the first bit, and those bits.
+    fn words_below(&self, end: usize, mut each: impl FnMut(usize, u64)) {
+        let mut at = self.next_bit(0);
+        while at < end {
+            let first = at / 64 * 64;
+            let word = self.levels[0][first / 64];
+            each(first, if end - first < 64 { word & ((1 << (end - first)) - 1) } else { word });
+            at = self.next_bit(first + 64);
+        }
+    }
+
     /// True if the number is a member.
     pub(crate) fn contains(&self, number: usize) -> bool {
         self.held == number || self.has_bit(number)
@@ -147,6 +199,7 @@ impl BitSet {
         if !self.has_bit(number) {
             return;
         }
+        self.bits -= 1;
         let mut at = number;
         for level in &mut self.levels {
             level[at / 64] &= !(1 << (at % 64));
@@ -181,8 +234,16 @@ mod tests {
                         set.remove(number);
                         model.remove(&number);
                     }
-                    2 => assert_eq!(set.next_from(number), model.range(number..).next().copied()),
+                    2 => assert_eq!(set.len(), model.len()),
                     3 => assert_eq!(set.lowest(), model.first().copied()),
+                    4 if random.is_multiple_of(5) => {
+                        let mut below = Vec::new();
+                        set.members_below(number, |member| below.push(member));
+                        assert_eq!(below, model.range(..number).copied().collect::<Vec<_>>());
+                        set.remove_below(number, |member| member % 3 != 0);
+                        model.retain(|member| *member >= number || member % 3 == 0);
+                        assert_eq!(set.len(), model.len());
+                    }
                     _ => {
                         set.insert(number);
                         model.insert(number);

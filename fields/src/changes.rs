@@ -103,6 +103,17 @@ impl ChangeLog {
         slots.for_each(|slot| self.wrote(slot as u32, revision));
     }
 
+    /// The last revision that a reader asked for, and the nodes' revisions; who writes these logs those who were not written since.
+    pub(crate) fn parts(&mut self) -> (Revision, &mut [Revision]) {
+        (*self.boundary.get_mut(), &mut self.nodes)
+    }
+
+    /// Notes nodes that were not written since the last revision that a reader asked for.
+    pub(crate) fn log(&mut self, slots: &[u32]) {
+        let boundary = *self.boundary.get_mut();
+        slots.iter().for_each(|slot| self.append(*slot, boundary));
+    }
+
     #[inline]
     fn append(&mut self, slot: u32, boundary: Revision) {
         if self.segments.back().is_none_or(|(start, _)| *start != boundary) {

@@ -43,16 +43,65 @@ impl<T: FieldValue> Column<T> {
         self.free.push(slot);
     }
 
+    /// All of it.
+    #[inline]
+    pub(crate) fn whole(&mut self) -> Stretch<'_, T> {
+        Stretch { first: 0, values: &mut self.values, revisions: &mut self.revisions }
+    }
+
+    /// See [`Stretch::write`].
+    #[inline]
+    pub(crate) fn write(&mut self, slot: u32, value: T, compare: bool, revision: Revision) -> bool {
+        self.whole().write(slot, value, compare, revision)
+    }
+}
+
+/// A part of a column that somebody has for himself. Slots are those of the column.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Stretch<'a, T> {
+    first: usize,
+    values: &'a mut [T],
+    revisions: &'a mut [Revision],
+}
+
+impl<T> Default for Stretch<'_, T> {
+    fn default() -> Self {
+        Self { first: 0, values: &mut [], revisions: &mut [] }
+    }
+}
+
+impl<'a, T: FieldValue> Stretch<'a, T> {
+    #[inline]
+    pub(crate) fn value(&self, slot: u32) -> &T {
+        &self.values[slot as usize - self.first]
+    }
+
+    #[inline]
+    fn revision(&self, slot: u32) -> Revision {
+        self.revisions[slot as usize - self.first]
+    }
+
     /// Writes unless `compare` and nothing would change; says whether it wrote.
     #[inline]
     pub(crate) fn write(&mut self, slot: u32, value: T, compare: bool, revision: Revision) -> bool {
-        let place = &mut self.values[slot as usize];
+        let at = slot as usize - self.first;
+        let place = &mut self.values[at];
         if compare && place.same(&value) {
             return false;
         }
         *place = value;
-        self.revisions[slot as usize] = revision;
+        self.revisions[at] = revision;
         true
+    }
+
+    /// Gives away what lies from a slot on.
+    fn split_off(&mut self, slot: u32) -> Stretch<'a, T> {
+        let length = (slot as usize).saturating_sub(self.first).min(self.values.len());
+        let (values, rest) = std::mem::take(&mut self.values).split_at_mut(length);
+        let (revisions, rest_revisions) = std::mem::take(&mut self.revisions).split_at_mut(length);
+        (self.values, self.revisions) = (values, revisions);
+        Stretch { first: self.first + length, values: rest, revisions: rest_revisions }
     }
 }
 
@@ -66,7 +115,74 @@ macro_rules! columns {
             pub(crate) $many_column: Column<std::sync::Arc<[$type]>>,
         )* }
 
+        /// A stretch of each column.
+        #[doc(hidden)]
+        #[derive(Debug, Default)]
+        pub struct Stretches<'a> { $(
+            pub(crate) $one_column: Stretch<'a, $type>,
+            pub(crate) $many_column: Stretch<'a, std::sync::Arc<[$type]>>,
+        )* }
+
+        impl<'a> Stretches<'a> {
+            /// Gives away what lies from these places on.
+            pub(crate) fn split_off(&mut self, at: &Places) -> Stretches<'a> {
+                Stretches { $(
+                    $one_column: self.$one_column.split_off(at.$one_column),
+                    $many_column: self.$many_column.split_off(at.$many_column),
+                )* }
+            }
+
+            pub(crate) fn value(&self, field_type: FieldType, slot: u32) -> Value {
+                match (field_type.kind, field_type.multiple) { $(
+                    (Kind::$one, false) => Value::$one(self.$one_column.value(slot).clone()),
+                    (Kind::$one, true) => Value::$many(self.$many_column.value(slot).clone()),
+                )* }
+            }
+
+            pub(crate) fn revision(&self, field_type: FieldType, slot: u32) -> Revision {
+                match (field_type.kind, field_type.multiple) { $(
+                    (Kind::$one, false) => self.$one_column.revision(slot),
+                    (Kind::$one, true) => self.$many_column.revision(slot),
+                )* }
+            }
+        }
+
+        /// A place in each column.
+        #[derive(Clone, Debug)]
+        pub(crate) struct Places { $($one_column: u32, $many_column: u32,)* }
+
+        impl Places {
+            pub(crate) fn filled(place: u32) -> Self {
+                Self { $($one_column: place, $many_column: place,)* }
+            }
+
+            pub(crate) fn of_mut(&mut self, field_type: FieldType) -> &mut u32 {
+                match (field_type.kind, field_type.multiple) { $(
+                    (Kind::$one, false) => &mut self.$one_column,
+                    (Kind::$one, true) => &mut self.$many_column,
+                )* }
+            }
+
+            /// What a function makes of both places in each column.
+            pub(crate) fn each(self, other: &Self, one: impl Fn(u32, u32) -> u32) -> Self {
+                Self { $(
+                    $one_column: one(self.$one_column, other.$one_column),
+                    $many_column: one(self.$many_column, other.$many_column),
+                )* }
+            }
+
+            /// True if none of these places is behind the other's.
+            pub(crate) fn all_up_to(&self, other: &Self) -> bool {
+                true $(&& self.$one_column <= other.$one_column && self.$many_column <= other.$many_column)*
+            }
+        }
+
         impl Columns {
+            /// All of each column.
+            pub(crate) fn stretches(&mut self) -> Stretches<'_> {
+                Stretches { $($one_column: self.$one_column.whole(), $many_column: self.$many_column.whole(),)* }
+            }
+
             /// Takes a slot for a value.
             pub(crate) fn insert(&mut self, value: Value, owner: (u32, u16), revision: Revision) -> u32 {
                 match value { $(

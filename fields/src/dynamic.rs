@@ -32,6 +32,7 @@ impl Graph {
         let noted = self.journal.is_some().then(|| Box::new(field.clone()));
         node.dynamic[place] = Some(field);
         node.slots[index as usize] = slot;
+        self.schedule.layout += 1;
         self.changes.wrote(slot_of(id), revision);
         self.schedule.mark(slot_of(id));
         let added = FieldId { node: id, index };

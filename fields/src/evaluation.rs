@@ -3,89 +3,68 @@
 use std::collections::HashMap;
 
 use crate::changes::{ChangeLog, Revision};
-use crate::column::Columns;
+use crate::column::{Columns, Stretches};
 use crate::frame::Problem;
 use crate::graph::Node;
-use crate::kept::Kept;
 use crate::kind::for_each_kind;
 use crate::{Field, FieldId, FieldType, FieldValue, NodeId, SetRule, Value};
 
-/// Where an evaluation reads and writes.
+/// Where an evaluation reads and writes. All that it writes is one write: it has one revision.
 pub(crate) enum Store<'a> {
-    /// The graph itself.
-    Now { columns: &'a mut Columns, changes: &'a mut ChangeLog },
-    /// The graph as it is before the node's turn; writes are kept for that.
-    Ahead { columns: &'a Columns, writes: &'a mut Kept, first: usize },
+    /// All columns.
+    All { columns: &'a mut Columns, changes: &'a mut ChangeLog, revision: Revision },
+    /// Stretches of them in which the node's fields lie; who gave them will note that it wrote.
+    Apart { values: &'a mut Stretches<'a>, revision: Revision, wrote: bool },
 }
 
 impl Store<'_> {
-    #[inline]
-    fn columns(&self) -> &Columns {
-        match self {
-            Store::Now { columns, .. } => columns,
-            Store::Ahead { columns, .. } => columns,
-        }
-    }
-
-    /// True if this evaluation wrote the field, and that waits.
-    #[inline]
-    fn keeps(&self, index: u16) -> bool {
-        match self {
-            Store::Now { .. } => false,
-            Store::Ahead { writes, first, .. } => writes.last(*first, index).is_some(),
-        }
-    }
-
     /// The value of a field of this type.
     #[inline]
-    fn get<T: FieldValue>(&self, index: u16, slot: u32) -> T {
-        if let Store::Ahead { writes, first, .. } = self
-            && let Some(value) = writes.last(*first, index).and_then(|write| writes.get::<T>(write))
-        {
-            return value.clone();
-        }
-        T::column(self.columns()).values[slot as usize].clone()
-    }
-
-    fn value(&self, index: u16, field_type: FieldType, slot: u32) -> Value {
-        if let Store::Ahead { writes, first, .. } = self
-            && let Some(write) = writes.last(*first, index)
-        {
-            return writes.value(write);
-        }
-        self.columns().value(field_type, slot)
-    }
-
-    /// Writes now, or keeps the write if it would change anything.
-    #[inline]
-    fn write<T: FieldValue>(&mut self, place: (u32, u16, u32), value: T, compare: bool) {
-        let (node, index, slot) = place;
+    fn get<T: FieldValue>(&self, slot: u32) -> T {
         match self {
-            Store::Now { columns, changes } => {
-                let revision = changes.last() + 1;
-                if T::column_mut(columns).write(slot, value, compare, revision) {
-                    changes.next();
-                    changes.wrote(node, revision);
+            Store::All { columns, .. } => T::column(columns).values[slot as usize].clone(),
+            Store::Apart { values, .. } => T::stretch(values).value(slot).clone(),
+        }
+    }
+
+    fn value(&self, field_type: FieldType, slot: u32) -> Value {
+        match self {
+            Store::All { columns, .. } => columns.value(field_type, slot),
+            Store::Apart { values, .. } => values.value(field_type, slot),
+        }
+    }
+
+    /// When a field was written.
+    #[inline]
+    fn revision(&self, field_type: FieldType, slot: u32) -> Revision {
+        match self {
+            Store::All { columns, .. } => columns.revisions(field_type)[slot as usize],
+            Store::Apart { values, .. } => values.revision(field_type, slot),
+        }
+    }
+
+    #[inline]
+    fn write<T: FieldValue>(&mut self, (node, slot): (u32, u32), value: T, compare: bool) {
+        match self {
+            Store::All { columns, changes, revision } => {
+                if T::column_mut(columns).write(slot, value, compare, *revision) {
+                    changes.wrote(node, *revision);
                 }
             }
-            Store::Ahead { columns, writes, first } => {
-                let kept = writes.last(*first, index).and_then(|write| writes.get::<T>(write));
-                let now = kept.unwrap_or_else(|| &T::column(columns).values[slot as usize]);
-                if !compare || !now.same(&value) {
-                    writes.push(index, slot, value);
-                }
+            Store::Apart { values, revision, wrote } => {
+                *wrote |= T::stretch_mut(values).write(slot, value, compare, *revision);
             }
         }
     }
 
-    fn write_value(&mut self, place: (u32, u16, u32), value: Value, compare: bool) {
+    fn write_value(&mut self, place: (u32, u32), value: Value, compare: bool) {
         write_typed(self, place, value, compare);
     }
 }
 
 macro_rules! write_typed {
     ($(($one:ident, $many:ident, $type:ty, $one_column:ident, $many_column:ident, $name:literal, $default:expr))*) => {
-        fn write_typed(store: &mut Store<'_>, place: (u32, u16, u32), value: Value, compare: bool) {
+        fn write_typed(store: &mut Store<'_>, place: (u32, u32), value: Value, compare: bool) {
             match value { $(
                 Value::$one(one) => store.write(place, one, compare),
                 Value::$many(many) => store.write(place, many, compare),
@@ -125,9 +104,9 @@ impl Evaluation<'_> {
         if let Some(field) = self.node.field(index) {
             let slot = self.node.slots[index as usize];
             if field.field_type == T::TYPE {
-                return self.store.get(index, slot);
+                return self.store.get(slot);
             }
-            let value = self.store.value(index, field.field_type, slot);
+            let value = self.store.value(field.field_type, slot);
             if let Some(value) = value.convert(T::TYPE).as_ref().and_then(T::from_value) {
                 return value;
             }
@@ -143,7 +122,7 @@ impl Evaluation<'_> {
         };
         let slot = self.node.slots[index as usize];
         let compare = field.on_set == SetRule::Compare;
-        let place = (self.slot, index, slot);
+        let place = (self.slot, slot);
         if field.field_type == T::TYPE && field.range.is_none() {
             return self.store.write(place, value, compare);
         }
@@ -158,16 +137,14 @@ impl Evaluation<'_> {
     /// True if the field was written since the last evaluation, or since the node was created.
     pub fn changed(&self, index: u16) -> bool {
         let Some(field) = self.node.field(index) else { return false };
-        let revision = self.store.columns().revisions(field.field_type)[self.node.slots[index as usize] as usize];
-        self.store.keeps(index)
-            || revision > self.evaluated && self.silenced.get(&FieldId { node: self.id, index }) != Some(&revision)
+        let revision = self.store.revision(field.field_type, self.node.slots[index as usize]);
+        revision > self.evaluated && self.silenced.get(&FieldId { node: self.id, index }) != Some(&revision)
     }
 
     /// True if the field was ever written, since the node was created.
     pub fn written(&self, index: u16) -> bool {
         let Some(field) = self.node.field(index) else { return false };
-        self.store.keeps(index)
-            || self.store.columns().revisions(field.field_type)[self.node.slots[index as usize] as usize] > self.node.created
+        self.store.revision(field.field_type, self.node.slots[index as usize]) > self.node.created
     }
 
     /// The declarations of the node's fields with their places.

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashSet};
 use crate::graph::slot_of;
 use crate::propagate::Carried;
 use crate::record::Event;
-use crate::schedule::{EVALUATES, IN_TURN, OBSERVED, ROUTED, SILENCED};
+use crate::schedule::{EVALUATES, IN_TURN, NATIVE, OBSERVED, ROUTED, SILENCED};
 use crate::{Error, FieldId, Graph, Mode, NodeId, Strength};
 
 /// What the graph asks for while a frame is evaluated. Everything is allowed in these calls but to evaluate the graph: what is created,
@@ -108,7 +108,7 @@ impl Graph {
         while let Some(slot) = self.next_turn() {
             self.turn(slot, host);
         }
-        self.ahead.end_frame();
+        self.batches.end_frame();
         self.frame.begun = false;
         self.schedule.running = false;
         self.frame.asked.clear();
@@ -116,9 +116,7 @@ impl Graph {
 
     #[inline]
     fn next_turn(&mut self) -> Option<u32> {
-        if self.ahead.threads > 1 {
-            self.evaluate_ahead();
-        }
+        self.run_batch();
         self.schedule.next()
     }
 
@@ -157,7 +155,7 @@ impl Graph {
         }
         let flags = self.nodes[id].base_flags();
         let at = &mut self.schedule.flags[slot as usize];
-        *at = *at & !EVALUATES | flags;
+        *at = *at & !(EVALUATES | NATIVE) | flags;
         if mode == Mode::OnChange && self.changes.node(slot) > self.schedule.turns[slot as usize].evaluated {
             self.schedule.mark(slot);
         }
@@ -229,6 +227,12 @@ impl Graph {
         if (flags & !(ROUTED | SILENCED) != 0 || asked) && !self.live_turn(slot, asked, host) {
             return;
         }
+        self.finish_turn(slot);
+    }
+
+    /// The part of a turn that follows the evaluation.
+    #[inline]
+    pub(crate) fn finish_turn(&mut self, slot: u32) {
         if self.schedule.flags[slot as usize] & ROUTED != 0 {
             self.copy_out(slot);
         } else {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use slotmap::{Key, SlotMap};
 
-use crate::ahead::Ahead;
+use crate::batch::Batches;
 use crate::changes::ChangeLog;
 use crate::column::Columns;
 use crate::explain::Explain;
@@ -16,7 +16,7 @@ use crate::observe::Observers;
 use crate::program::Programs;
 use crate::record::{Event, Journal};
 use crate::route::Routes;
-use crate::schedule::{EVALUATES, Schedule};
+use crate::schedule::{EVALUATES, NATIVE, Schedule};
 use crate::{Error, Evaluator, Field, Kind, Mode, NodeType, Revision, TypeRegistry};
 
 slotmap::new_key_type! {
@@ -90,7 +90,8 @@ impl Node {
     pub(crate) fn base_flags(&self) -> u8 {
         match (&self.node_type.evaluator, self.mode) {
             (Evaluator::None, _) | (_, Mode::Pull) => 0,
-            _ => EVALUATES,
+            (Evaluator::Native(_), _) => EVALUATES | NATIVE,
+            (Evaluator::Host, _) => EVALUATES,
         }
     }
 }
@@ -108,7 +109,7 @@ pub struct Graph {
     pub(crate) programs: Programs,
     pub(crate) observers: Observers,
     pub(crate) frame: FrameState,
-    pub(crate) ahead: Ahead,
+    pub(crate) batches: Batches,
     /// Why fields were written, while somebody wants to know.
     pub(crate) explain: Option<Box<Explain>>,
     /// What happens from outside, if somebody records.
@@ -140,7 +141,7 @@ impl Graph {
             programs: Programs::default(),
             observers: Observers::default(),
             frame: FrameState::default(),
-            ahead: Ahead::default(),
+            batches: Batches::default(),
             explain: None,
             silenced: HashMap::new(),
             names: HashMap::new(),

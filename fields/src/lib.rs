@@ -13,7 +13,7 @@
 //! scans over all nodes: what did not change costs nothing.
 
 mod access;
-mod ahead;
+mod batch;
 mod bits;
 mod changes;
 mod codec;
@@ -29,7 +29,6 @@ mod field;
 mod frame;
 mod graph;
 mod invariants;
-mod kept;
 mod kind;
 mod names;
 mod naming;

@@ -133,11 +133,13 @@ impl Graph {
         }
         let mut order: Vec<u32> = slots.iter().copied().filter(|slot| waits_for[*slot as usize] == 0).collect();
         let (mut done, mut levels) = (0, Vec::new());
-        while let Some(slot) = order.get(done).copied() {
+        while done < order.len() {
             // What no node of the levels so far has to wait for is the next level: first in, first out keeps them apart.
             if levels.last().is_none_or(|end| *end == done) {
+                order[done..].sort_unstable();
                 levels.push(order.len());
             }
+            let slot = order[done];
             done += 1;
             let outgoing = self.nodes[self.ids[slot as usize]].outgoing.iter().map(|route| &self.routes.all[*route]);
             let strong = outgoing.filter(|route| route.strength == Strength::Strong).map(|route| slot_of(route.to.node));

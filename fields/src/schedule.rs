@@ -17,6 +17,8 @@ pub(crate) const DIRTY: u8 = 8;
 pub(crate) const IN_TURN: u8 = 16;
 /// Some fields were last written silently.
 pub(crate) const SILENCED: u8 = 32;
+/// A function evaluates the node.
+pub(crate) const NATIVE: u8 = 64;
 /// Somebody has to hear of the node's changes.
 const INTEREST: u8 = EVALUATES | ROUTED | OBSERVED;
 
@@ -38,6 +40,14 @@ pub(crate) struct Turn {
     pub(crate) count: u32,
 }
 
+impl Turn {
+    /// Notes an evaluation.
+    #[inline]
+    pub(crate) fn had(&mut self, frame: u64, revision: Revision) {
+        (self.frame, self.evaluated, self.count) = (frame, revision, self.count.wrapping_add(1));
+    }
+}
+
 #[derive(Debug, Default)]
 pub(crate) struct Schedule {
     /// By node slot, beside each other because every write reads them.
@@ -56,8 +66,11 @@ pub(crate) struct Schedule {
     pub(crate) running: bool,
     /// Ranks without a node, and nodes that came after the last numbering.
     pub(crate) holes: usize,
-    /// Where the levels of the order end, by rank: nodes of a level have no strong routes between each other. Nodes that came later follow.
+    /// Where the levels of the order end, by rank: nodes of a level have no strong routes between each other, and are in the order of their
+    /// slots. Nodes that came later follow.
     pub(crate) levels: Vec<u32>,
+    /// Counts what may change where the values of a level's nodes lie.
+    pub(crate) layout: u64,
 }
 
 impl Schedule {
@@ -155,14 +168,29 @@ impl Schedule {
         self.levels.get(level).map(|end| *end as usize)
     }
 
-    /// The nodes that wait for their turn and come before a rank, in order.
-    pub(crate) fn waiting_below(&self, end: usize) -> impl Iterator<Item = u32> {
-        let mut from = 0;
-        std::iter::from_fn(move || {
-            let rank = self.queue.next_from(from).filter(|rank| *rank < end)?;
-            from = rank + 1;
-            Some(self.by_rank[rank])
-        })
+    /// By rank, the slots of the level with this end.
+    pub(crate) fn level(&self, end: usize) -> &[u32] {
+        let before = self.levels.partition_point(|other| (*other as usize) < end);
+        let start = before.checked_sub(1).map_or(0, |before| self.levels[before] as usize);
+        &self.by_rank[start..end]
+    }
+
+    /// How many nodes wait for their turn in this frame.
+    #[inline]
+    pub(crate) fn waiting(&self) -> usize {
+        self.queue.len()
+    }
+
+    /// Gives those that wait and come before a rank, and whose flags fit, their turn together, unless they are fewer than some.
+    pub(crate) fn take_together(&mut self, end: usize, slots: &mut Vec<u32>, fits: impl Fn(u8) -> bool, least: usize) {
+        let (by_rank, flags) = (&self.by_rank, &self.flags);
+        let fits = |rank: usize| fits(flags[by_rank[rank] as usize]);
+        self.queue.members_below(end, |rank| slots.extend(fits(rank).then(|| by_rank[rank])));
+        if slots.len() < least {
+            return slots.clear();
+        }
+        self.queue.remove_below(end, fits);
+        slots.iter().for_each(|slot| self.flags[*slot as usize] &= !DIRTY);
     }
 
     /// Starts a frame: all that wait get a place in the queue.
@@ -244,12 +272,14 @@ impl Schedule {
             self.queue.insert(rank as usize);
         }
         (self.stale, self.holes, self.levels) = (false, 0, levels);
+        self.layout += 1;
     }
 
     /// Takes an order with its holes from a snapshot, between frames.
-    pub(crate) fn restore_order(&mut self, by_rank: Vec<u32>) {
+    pub(crate) fn restore_order(&mut self, by_rank: Vec<u32>, levels: Vec<u32>) {
         self.queue.reserve(by_rank.len());
-        self.by_rank = by_rank;
+        (self.by_rank, self.levels) = (by_rank, levels);
+        self.layout += 1;
     }
 
     /// True if the node will have a turn in this frame.

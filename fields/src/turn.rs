@@ -23,14 +23,9 @@ impl Graph {
     #[inline]
     pub(crate) fn run_evaluator(&mut self, id: NodeId, host: &mut dyn Host) -> bool {
         let slot = slot_of(id);
-        if self.ahead.threads > 1 && self.take_from_ahead(id) {
-            self.schedule.turns[slot as usize].evaluated = self.changes.last();
-            return true;
-        }
         match &self.nodes[id].node_type.evaluator {
             Evaluator::None => {}
-            Evaluator::Native(_) if self.ahead.threads <= 1 => self.evaluate_native(id),
-            Evaluator::Native(_) => self.evaluate_measured(id),
+            Evaluator::Native(_) => self.evaluate_native(id),
             Evaluator::Host => {
                 self.note(|| Event::HostEvaluates(id));
                 host.evaluate(self, id);
@@ -49,11 +44,12 @@ impl Graph {
         let slot = slot_of(id);
         let node = &self.nodes[id];
         let Evaluator::Native(evaluate) = &node.node_type.evaluator else { return };
+        let revision = self.changes.last() + 1;
         let mut evaluation = Evaluation {
             id,
             slot,
             node,
-            store: Store::Now { columns: &mut self.columns, changes: &mut self.changes },
+            store: Store::All { columns: &mut self.columns, changes: &mut self.changes, revision },
             silenced: &self.silenced,
             problems: &mut self.frame.report.problems,
             time_s: self.frame.time_s,
@@ -63,6 +59,9 @@ impl Graph {
         evaluate(&mut evaluation);
         if evaluation.again {
             self.schedule.again(slot);
+        }
+        if self.changes.node(slot) == revision {
+            self.changes.catch_up(revision);
         }
     }
 }

@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 
-use crate::column::{Column, Columns};
-use crate::kept::Values;
+use crate::column::{Column, Columns, Stretch, Stretches};
 use crate::kind::for_each_kind;
 use crate::{Color, ColorA, EnumValue, FieldType, Image, Kind, NodeId, Rotation, Time};
 
@@ -22,9 +21,9 @@ pub trait FieldValue: Clone + Same + Send + Sync + Into<Value> + 'static {
     #[doc(hidden)]
     fn column_mut(columns: &mut Columns) -> &mut Column<Self>;
     #[doc(hidden)]
-    fn kept(values: &Values) -> &Vec<Self>;
+    fn stretch<'a, 'b>(stretches: &'b Stretches<'a>) -> &'b Stretch<'a, Self>;
     #[doc(hidden)]
-    fn kept_mut(values: &mut Values) -> &mut Vec<Self>;
+    fn stretch_mut<'a, 'b>(stretches: &'b mut Stretches<'a>) -> &'b mut Stretch<'a, Self>;
 }
 
 /// Equality of bits: a NaN is the same as itself and -0 differs from 0, so that "not changed" never loses anything.
@@ -173,9 +172,9 @@ macro_rules! values {
                 fn column(columns: &Columns) -> &Column<Self> { &columns.$one_column }
                 #[inline]
                 fn column_mut(columns: &mut Columns) -> &mut Column<Self> { &mut columns.$one_column }
-                fn kept(values: &Values) -> &Vec<Self> { &values.$one_column }
+                fn stretch<'a, 'b>(stretches: &'b Stretches<'a>) -> &'b Stretch<'a, Self> { &stretches.$one_column }
                 #[inline]
-                fn kept_mut(values: &mut Values) -> &mut Vec<Self> { &mut values.$one_column }
+                fn stretch_mut<'a, 'b>(stretches: &'b mut Stretches<'a>) -> &'b mut Stretch<'a, Self> { &mut stretches.$one_column }
             }
             impl FieldValue for Arc<[$type]> {
                 const TYPE: FieldType = FieldType::many(Kind::$one);
@@ -187,9 +186,9 @@ macro_rules! values {
                 fn column(columns: &Columns) -> &Column<Self> { &columns.$many_column }
                 #[inline]
                 fn column_mut(columns: &mut Columns) -> &mut Column<Self> { &mut columns.$many_column }
-                fn kept(values: &Values) -> &Vec<Self> { &values.$many_column }
+                fn stretch<'a, 'b>(stretches: &'b Stretches<'a>) -> &'b Stretch<'a, Self> { &stretches.$many_column }
                 #[inline]
-                fn kept_mut(values: &mut Values) -> &mut Vec<Self> { &mut values.$many_column }
+                fn stretch_mut<'a, 'b>(stretches: &'b mut Stretches<'a>) -> &'b mut Stretch<'a, Self> { &mut stretches.$many_column }
             }
         )*
     };

@@ -103,8 +103,10 @@ fn turns_fit(state: &StateRecord) -> bool {
     let rank_of = |slot: usize| state.turns.get(slot).map(|turn| turn.3);
     let ranks = state.by_rank.iter().enumerate();
     let mut ranks = ranks.filter(|(_, slot)| **slot != NO_RANK);
+    let levels = state.levels.last().is_none_or(|end| *end as usize <= state.by_rank.len()) && state.levels.is_sorted();
     let mut turns = state.turns.iter().enumerate().filter(|(_, turn)| turn.3 != NO_RANK);
-    ranks.all(|(rank, slot)| rank_of(*slot as usize) == Some(rank as u32))
+    levels
+        && ranks.all(|(rank, slot)| rank_of(*slot as usize) == Some(rank as u32))
         && turns.all(|(slot, turn)| state.by_rank.get(turn.3 as usize) == Some(&(slot as u32)))
 }
 
@@ -172,7 +174,7 @@ fn restore_routes(graph: &mut Graph, state: &StateRecord, numbers: &mut Numbers)
 
 fn restore_schedule(graph: &mut Graph, state: &StateRecord) {
     let schedule = &mut graph.schedule;
-    schedule.restore_order(state.by_rank.clone());
+    schedule.restore_order(state.by_rank.clone(), state.levels.clone());
     schedule.flags = state.flags.clone();
     let turn = |&(propagated, evaluated, frame, rank, count): &_| Turn { propagated, evaluated, frame, rank, count };
     schedule.turns = state.turns.iter().map(turn).collect();

@@ -8,7 +8,7 @@ use crate::support::{Random, frame};
 fn mix(evaluation: &mut Evaluation<'_>) {
     let [a, b, state] = [0, 1, 2].map(|index| evaluation.get::<i64>(index));
     let mut mixed = a.wrapping_mul(31).wrapping_add(b).wrapping_add(state.rotate_left(7));
-    for _ in 0..20_000 {
+    for _ in 0..4000 {
         mixed = std::hint::black_box(mixed ^ (mixed << 13) ^ ((mixed as u64) >> 7) as i64);
     }
     mixed =
@@ -85,13 +85,20 @@ fn hash(graph: &Graph) -> u64 {
     hash
 }
 
-/// The hashes of the frames of a random session, and what the frames reported.
-fn session(seed: u64, threads: usize) -> Vec<(u64, umbriel_fields::FrameReport)> {
+/// The hashes of the frames of a random session, and what the frames reported. `churned` mixes where values lie before it starts.
+fn session(seed: u64, threads: usize, churned: bool) -> Vec<(u64, umbriel_fields::FrameReport)> {
     let mut random = Random(seed);
     let mut graph = Graph::new(mixers());
     graph.set_threads(threads);
-    let kinds = ["Mix", "Mix", "Mix", "Plain", "Script"];
-    let nodes: Vec<NodeId> = (0..120).map(|_| graph.create(random.pick(&kinds).unwrap()).unwrap()).collect();
+    let kinds = ["Mix", "Mix", "Mix", "Mix", "Mix", "Mix", "Plain", "Script"];
+    let mut nodes: Vec<NodeId> = (0..300).map(|_| graph.create(random.pick(&kinds).unwrap()).unwrap()).collect();
+    for _ in 0..if churned { 200 } else { 0 } {
+        let gone = nodes.swap_remove(random.below(nodes.len()));
+        graph.delete(gone).unwrap();
+        if random.below(2) == 0 {
+            nodes.push(graph.create(random.pick(&kinds).unwrap()).unwrap());
+        }
+    }
     for _ in 0..150 {
         let [from, to] = [(); 2].map(|()| FieldId { node: random.pick(&nodes).unwrap(), index: random.below(4) as u16 });
         let strength = if random.below(5) == 0 { Strength::Weak } else { Strength::Strong };
@@ -101,7 +108,11 @@ fn session(seed: u64, threads: usize) -> Vec<(u64, umbriel_fields::FrameReport)>
     let mut host = Meddler { random: Random(seed + 1), nodes: nodes.clone() };
     (0..12)
         .map(|number| {
-            for _ in 0..random.below(60) {
+            if number % 5 == 4 {
+                let node = random.pick(&nodes).unwrap();
+                let _ = graph.add_field(node, Field::new(format!("more{number}"), 0i64));
+            }
+            for _ in 0..random.below(400) {
                 let field = FieldId { node: random.pick(&nodes).unwrap(), index: random.below(4) as u16 };
                 graph.set(field, random.below(1000) as i64).unwrap();
             }
@@ -116,9 +127,10 @@ fn session(seed: u64, threads: usize) -> Vec<(u64, umbriel_fields::FrameReport)>
 fn any_number_of_threads_gives_the_same_bits() {
     let mut different = std::collections::HashSet::new();
     for seed in 0..6 {
-        let serial = session(seed, 1);
+        let churned = seed % 3 == 2;
+        let serial = session(seed, 1, churned);
         for threads in [2, 3, 8] {
-            assert_eq!(session(seed, threads), serial, "seed {seed}, {threads} threads");
+            assert_eq!(session(seed, threads, churned), serial, "seed {seed}, {threads} threads");
         }
         different.extend(serial.into_iter().map(|(hash, _)| hash));
     }
@@ -149,5 +161,58 @@ fn independent_nodes_are_evaluated_on_several_threads() {
         // The first frame measures, the second knows.
         assert_eq!(seen.lock().unwrap().len(), threads, "of {threads}");
         assert_eq!(frame(&mut graph).evaluated, 0, "idle frames stay idle");
+    }
+}
+
+/// Writes into a node of the same level.
+struct Neighbour(NodeId);
+
+impl Host for Neighbour {
+    fn evaluate(&mut self, graph: &mut Graph, _: NodeId) {
+        graph.set_named(self.0, "in", 9i64).unwrap();
+    }
+}
+
+#[test]
+fn many_nodes_of_a_level_have_their_turns_together_before_the_host() {
+    for threads in [1, 2] {
+        let mut graph = Graph::new(crate::support::types());
+        graph.set_threads(threads);
+        // The script is made first, but what needs no host goes before it.
+        let script = graph.create("Script").unwrap();
+        let counters: Vec<NodeId> = (0..100).map(|_| graph.create("Counter").unwrap()).collect();
+        let plain = graph.create("Plain").unwrap();
+        let (from, count) = (graph.field(counters[3], "count").unwrap(), graph.field(plain, "x").unwrap());
+        graph.connect(from, count, Strength::Strong).unwrap();
+        // A dependency numbers all anew, so that they are of one level.
+        graph.depend_for_this_frame(script, plain).unwrap();
+        graph.evaluate(0.0, &mut NoHost);
+        for node in counters.iter().chain([&script]) {
+            graph.set_named(*node, "in", 1i64).unwrap();
+        }
+        let mut host = Neighbour(counters[3]);
+        let counts = |graph: &Graph| [0, 3].map(|place| graph.get_named::<i64>(counters[place], "count").unwrap());
+        assert_eq!(graph.evaluate(0.0, &mut host).evaluated, 101);
+        assert_eq!((counts(&graph), graph.get::<i64>(count).unwrap()), ([2, 2], 2), "{threads} threads");
+        assert_eq!(graph.evaluate(0.0, &mut host).evaluated, 1, "the write came after the turn");
+        assert_eq!((counts(&graph), graph.get::<i64>(count).unwrap()), ([2, 3], 3), "{threads} threads");
+    }
+}
+
+#[test]
+fn an_evaluation_is_one_write() {
+    let mut graph = Graph::new(mixers());
+    for count in [1, 100] {
+        let nodes: Vec<NodeId> = (0..count).map(|_| graph.create("Mix").unwrap()).collect();
+        for node in &nodes {
+            graph.set_named(*node, "a", 5i64).unwrap();
+        }
+        frame(&mut graph);
+        let written: Vec<_> = nodes
+            .iter()
+            .map(|node| ["state", "ranged"].map(|name| graph.field_revision(graph.field(*node, name).unwrap())))
+            .collect();
+        assert!(written.iter().all(|[state, ranged]| state == ranged), "{written:?}");
+        assert!(written.windows(2).all(|pair| pair[0][0] < pair[1][0]), "each node's is its own: {written:?}");
     }
 }
