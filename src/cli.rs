@@ -28,6 +28,11 @@ pub(crate) enum Command {
     /// lit or shadowed in all sub-samples, the share where the renderer disagrees, and intersection over union of the
     /// shadow.
     ShadowError(ShadowError),
+    /// Writes the shadow maps of one light as a picture: near is white, far is dark grey, nothing is black
+    ///
+    /// One map of a spot light, one per cascade of a directional light from the finest on, six of a point light
+    /// (+x -x +y -y +z -z), side by side.
+    ShadowMap(ShadowMap),
     /// Plays a recording and compares every frame with what was recorded
     ///
     /// Exit status: 0 all frames are the same bit by bit, 2 they differ or the recording is cut off, 1 it cannot be played.
@@ -211,6 +216,24 @@ pub(crate) struct Doctor {
     /// Draw before and after side by side to this .png
     #[arg(long)]
     pub(crate) picture: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct ShadowMap {
+    /// A world (.rhai) or a model (.gltf, .glb)
+    pub(crate) path: PathBuf,
+    /// The light, by name; otherwise the first that casts by a map
+    #[arg(long)]
+    pub(crate) light: Option<String>,
+    /// File to write
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// The display or viewpoint that maps are fitted to, by name; otherwise all displays
+    #[arg(long)]
+    pub(crate) view: Option<String>,
+    /// Time of the frame in seconds
+    #[arg(long, default_value_t = 0.0, value_parser = finite)]
+    pub(crate) time: f64,
 }
 
 #[derive(Args, Debug)]

@@ -12,6 +12,7 @@ mod replay;
 mod scene_file;
 mod session;
 mod shadow_error;
+mod shadow_map;
 mod source;
 mod window;
 
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
         Command::Run(args) if args.headless => headless::run(args),
         Command::Run(args) => window::run(args).map(|()| 0),
         Command::ShadowError(args) => shadow_error::run(args),
+        Command::ShadowMap(args) => shadow_map::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Explain(args) => replay::explain(args).map(|text| print(&text)),
         Command::Doctor(args) => doctor::run(args),

@@ -36,7 +36,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
     let truncated = folder("command").join("truncated.glb");
     std::fs::write(&truncated, b"glTF\x02\0\0\0\xff\0\0\0").expect("a file can be written");
     // Name, line of the world, what the message must contain. The rest of the world is drawn.
-    let rows: [(&str, &str, &[&str]); 17] = [
+    let rows: [(&str, &str, &[&str]); 21] = [
         (
             "negative_soft_range",
             r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "volume", soft: "range", soft_range: -1.0 }));"#,
@@ -66,6 +66,26 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
             "near_behind_far",
             r#"world.add(make("SpotLight", #{ name: "spot", shadows: "map", shadow_near_far: vec2(5.0, 1.0) }));"#,
             &["near_behind_far.rhai:4", "spot", "shadow_near_far"],
+        ),
+        (
+            "empty_rectangle",
+            r#"world.add(make("SpotLight", #{ name: "spot", shadows: "map", shadow_frustum: vec4(0.5, 0.5, -1.0, 1.0) }));"#,
+            &["empty_rectangle.rhai:4:11", "spot", "shadow_frustum", "makes no sense here"],
+        ),
+        (
+            "bias_that_is_no_number",
+            r#"world.add(make("SpotLight", #{ name: "spot", shadows: "map", displace_offset: 0.0/0.0 }));"#,
+            &["bias_that_is_no_number.rhai:4:11", "spot", "displace_offset", "NaN"],
+        ),
+        (
+            "no_memory",
+            r#"world.add(make("Environment", #{ name: "air", shadow_memory: 0 }));"#,
+            &["no_memory.rhai:4:11", "air", "shadow_memory", "1024 is used"],
+        ),
+        (
+            "map_of_size_100000",
+            r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "map", shadow_size: 100000 }));"#,
+            &["sun", "100000", "using 16384"],
         ),
         (
             "missing_texture",
@@ -154,7 +174,7 @@ fn a_wrong_world_ends_with_a_message() {
 
 #[test]
 fn wrong_words_on_the_command_line() {
-    let rows: [(&[&str], &str); 8] = [
+    let rows: [(&[&str], &str); 9] = [
         (&["run", "nowhere.rhai", "--headless"], "nowhere.rhai"),
         (&["run", "nowhere.glb", "--headless"], "nowhere.glb"),
         (&["run", "a.txt", "--headless"], ".rhai"),
@@ -162,6 +182,7 @@ fn wrong_words_on_the_command_line() {
         (&["run", "a.rhai", "--headless", "--frames", "0"], "--frames"),
         (&["run", "a.rhai", "--headless", "--time", "NaN"], "--time"),
         (&["shadow-error", "--scene", "nowhere.json"], "nowhere.json"),
+        (&["shadow-map", "nowhere.rhai"], "nowhere.rhai"),
         (&["nodes", "Transfrom"], "Transform"),
     ];
     for (args, expected) in rows {
@@ -245,4 +266,53 @@ fn the_doctor_reports_mends_and_says_what_is_wrong() {
     }
     let run = umbriel(&["doctor", world]);
     assert!(run.stdout.contains("meshes="), "{}{}", run.stdout, run.stderr);
+}
+
+/// A light without a map is told from one with it, and the frames tell what maps cost.
+#[test]
+fn maps_are_shown_and_counted() {
+    let world = folder("command").join("maps.rhai");
+    let script = r#"
+world.add(transform(#{ translation: vec3(0, 1, 0) }, [shape(make("Box"))]));
+world.add(shape(make("Box", #{ size: vec3(9, 0.1, 9) })));
+let spot = make("SpotLight", #{ name: "spot", location: vec3(2, 6, 1), direction: vec3(-2, -6, -1), shadows: "map", shadow_size: 128 });
+world.add(spot);
+world.add(make("PointLight", #{ name: "lamp", location: vec3(0, 3, 0), shadows: "map", shadow_size: 64 }));
+world.add(make("PointLight", #{ name: "plain", location: vec3(0, 3, 0) }));
+world.add(make("Viewpoint", #{ position: vec3(0, 2, 8) }));
+"#;
+    std::fs::write(&world, script).expect("a world can be written");
+    let world = world.to_str().expect("paths are text");
+    for (light, size, printed) in
+        [("spot", [128, 128], "1 map of light 'spot', 128"), ("lamp", [384, 64], "6 maps of light 'lamp', 64")]
+    {
+        let out = folder("command").join(format!("{light}.map.png"));
+        let run = umbriel(&["shadow-map", world, "--light", light, "--out", out.to_str().expect("paths are text")]);
+        assert!(run.ok && run.stdout.contains(printed), "{}{}", run.stdout, run.stderr);
+        let picture = image::open(&out).expect("the picture was written").to_luma8();
+        assert_eq!(picture.dimensions(), (size[0], size[1]));
+        let (dark, bright) = picture.pixels().fold((255, 0), |(a, b), p| (p.0[0].min(a), p.0[0].max(b)));
+        assert!(dark < 50 && bright > 200, "{light}: {dark} to {bright}");
+    }
+    for (light, message) in [("plain", "has no shadow map"), ("nobody", "spot, lamp, plain")] {
+        let run = umbriel(&["shadow-map", world, "--light", light]);
+        assert!(!run.ok && run.stderr.contains(message), "{light}: {}", run.stderr);
+    }
+}
+
+/// After the one frame that was asked for the field itself says that the map rests (003).
+#[test]
+fn maps_drawn_once_rest_afterwards() {
+    for (second, is_fine) in [("none", true), ("next_frame_only", false)] {
+        let script = format!(
+            "{BACKDROP}let spot = make(\"SpotLight\", #{{ shadows: \"map\", shadow_update: \"next_frame_only\" }});\n\
+             world.add(spot);\n\
+             on_frame(|t, dt| {{\n\
+                 let expected = if t < 0.5 {{ \"next_frame_only\" }} else {{ \"{second}\" }};\n\
+                 if spot.shadow_update != expected {{ throw `${{spot.shadow_update}} at ${{t}} s`; }}\n\
+             }});\n"
+        );
+        let (run, _) = draw("once", &script, &["--frames", "2", "--fps", "1"]);
+        assert_eq!(run.ok, is_fine, "{second}: {}{}", run.stdout, run.stderr);
+    }
 }

@@ -12,3 +12,4 @@ mod soft;
 mod support;
 mod surfaces;
 mod town;
+mod truth;

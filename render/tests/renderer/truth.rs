@@ -1,0 +1,257 @@
+//! Shadow maps with settings that nobody tuned, against ray tracing: what is lit must not be speckled, what is dark must not
+//! leak, from a ball of centimetres to a square kilometre.
+
+use crate::support::*;
+use glam::{Mat4, Vec3};
+use std::f32::consts::TAU;
+use std::sync::Arc;
+use umbriel_scene::*;
+
+/// Pixels within this many of a shadow's edge are not counted as specks.
+const EDGE: usize = 4;
+
+fn sun(direction: Vec3) -> Light {
+    Light { direction: direction.normalize(), shadows: ShadowMethod::Map, ..noon() }
+}
+
+fn grey() -> Material {
+    Material { double_sided: true, ..matt(0.6, 0.6, 0.6) }
+}
+
+fn boxes(list: &[([f32; 3], [f32; 3])]) -> Vec<Drawable> {
+    list.iter().map(|(size, p)| shape(cuboid(Vec3::from(*size)), grey(), at(p[0], p[1], p[2]))).collect()
+}
+
+fn torus(radius: f32, thickness: f32) -> Mesh {
+    let (around, across) = (96u32, 48u32);
+    let (mut positions, mut normals, mut indices) = (Vec::new(), Vec::new(), Vec::new());
+    for i in 0..=around {
+        for j in 0..=across {
+            let (a, b) = (TAU * i as f32 / around as f32, TAU * j as f32 / across as f32);
+            let out = Vec3::new(a.cos(), 0.0, a.sin());
+            normals.push(out * b.cos() + Vec3::Y * b.sin());
+            positions.push(out * (radius + thickness * b.cos()) + Vec3::Y * (thickness * b.sin()));
+        }
+    }
+    for i in 0..around {
+        for j in 0..across {
+            let (a, b) = (i * (across + 1) + j, (i + 1) * (across + 1) + j);
+            indices.extend([a, a + 1, b + 1, a, b + 1, b]);
+        }
+    }
+    let (positions, normals, indices) = (positions.into(), normals.into(), indices.into());
+    Mesh { name: "torus".into(), positions, normals, indices, ..Default::default() }.checked().unwrap()
+}
+
+/// A card with a leaf that is cut out by alpha.
+fn leaf() -> Material {
+    let texel = |i: u32| {
+        let (x, y) = ((i % 32) as f32 / 15.5 - 1.0, (i / 32) as f32 / 15.5 - 1.0);
+        [90, 160, 60, if x.abs() < 0.8 * (1.0 - y * y) { 255 } else { 0 }]
+    };
+    let image = Image { width: 32, height: 32, rgba: (0..32 * 32).flat_map(texel).collect() };
+    let texture = TextureRef { image: Arc::new(image), sampler: Sampler::default(), uv_set: 0, uv_from_mesh: Default::default() };
+    Material { base_color_texture: Some(texture), alpha: AlphaMode::Mask { cutoff: 0.5 }, ..grey() }
+}
+
+fn forest() -> Vec<Drawable> {
+    let (card, leaf) = (Arc::new(plane(0.5)), Arc::new(leaf()));
+    let mut all = vec![shape(plane(40.0), grey(), Mat4::IDENTITY)];
+    for i in 0..300 {
+        // Spread and turned by the golden angle.
+        let turn = 2.399_963 * i as f32;
+        let place = Vec3::new(turn.cos(), 0.0, turn.sin()) * (0.25 * (i as f32).sqrt());
+        let height = 1.2 + 1.5 * ((i * 37 % 100) as f32 / 100.0);
+        let pose = Mat4::from_translation(place + Vec3::Y * height) * Mat4::from_rotation_y(turn) * Mat4::from_rotation_x(0.7);
+        all.push(shape_of(&card, &leaf, pose));
+    }
+    all.extend(boxes(&[([0.2, 2.0, 0.2], [0.0, 1.0, 0.0])]));
+    all
+}
+
+fn curved() -> Vec<Drawable> {
+    let at_scale = |x: f32, scale: f32| at(x, scale, 0.0) * Mat4::from_scale(Vec3::splat(scale));
+    vec![
+        shape(plane(12.0), grey(), Mat4::IDENTITY),
+        shape(ball(48), grey(), at_scale(-1.6, 0.8)),
+        shape(ball(48), grey(), at_scale(1.9, 0.4)),
+        shape(torus(0.8, 0.25), grey(), at(0.3, 0.6, 0.8) * Mat4::from_rotation_x(0.9)),
+    ]
+}
+
+fn railings() -> Vec<Drawable> {
+    let mut list = vec![([6.0, 0.03, 0.03], [0.0, 1.0, 0.0]), ([6.0, 0.03, 0.03], [0.0, 0.5, 0.0])];
+    list.extend((0..30).map(|i| ([0.02, 1.0, 0.02], [-2.9 + 0.2 * i as f32, 0.5, 0.0])));
+    let mut all = boxes(&list);
+    all.push(shape(plane(10.0), grey(), Mat4::IDENTITY));
+    all
+}
+
+fn room() -> Vec<Drawable> {
+    boxes(&[
+        ([6.0, 0.1, 6.0], [0.0, -0.05, 0.0]),
+        ([6.0, 0.1, 6.0], [0.0, 3.05, 0.0]),
+        ([0.1, 3.0, 6.0], [-3.05, 1.5, 0.0]),
+        ([0.1, 3.0, 6.0], [3.05, 1.5, 0.0]),
+        ([6.0, 3.0, 0.1], [0.0, 1.5, -3.05]),
+        ([1.2, 0.05, 0.8], [0.3, 0.75, -0.8]),
+        ([0.05, 0.72, 0.05], [-0.2, 0.36, -1.1]),
+        ([0.05, 0.72, 0.05], [0.8, 0.36, -0.5]),
+        ([0.4, 0.4, 0.4], [-1.4, 0.2, -1.2]),
+    ])
+}
+
+fn field() -> Vec<Drawable> {
+    let mut all = boxes(&[
+        ([1.0, 1.0, 1.0], [0.0, 0.5, 0.0]),
+        ([1.0, 2.0, 1.0], [3.0, 1.0, -4.0]),
+        ([9.0, 20.0, 9.0], [20.0, 10.0, -90.0]),
+    ]);
+    all.push(shape(plane(1000.0), grey(), Mat4::IDENTITY));
+    all
+}
+
+fn thumb() -> Vec<Drawable> {
+    let mut all = boxes(&[([0.02, 0.03, 0.02], [0.03, 0.015, 0.01])]);
+    all.push(shape(plane(0.3), grey(), Mat4::IDENTITY));
+    all.push(shape(ball(32), grey(), at(-0.02, 0.02, 0.0) * Mat4::from_scale(Vec3::splat(0.02))));
+    all
+}
+
+/// Share of the lit pixels away from edges that are dark, the same of the dark ones that are lit, and the score.
+fn compared(truth: &Mask, visibility: &[u8]) -> (f64, f64, Score) {
+    let [width, height] = [truth.width, truth.height].map(|v| v as usize);
+    let is_inside = |x: usize, y: usize, class: u8| {
+        let rows = y.saturating_sub(EDGE)..(y + EDGE + 1).min(height);
+        rows.into_iter().all(|v| {
+            let columns = x.saturating_sub(EDGE)..(x + EDGE + 1).min(width);
+            columns.into_iter().all(|u| truth.classes[v * width + u] == class)
+        })
+    };
+    let share = |class: u8, is_wrong: &dyn Fn(u8) -> bool| {
+        let inside = (0..width * height).filter(|i| is_inside(i % width, i / width, class));
+        let (wrong, all) = inside.fold((0, 0), |(w, n), i| (w + usize::from(is_wrong(visibility[i])), n + 1));
+        wrong as f64 / f64::from(all.max(1))
+    };
+    (share(Mask::LIT, &|v| v < 128), share(Mask::SHADOW, &|v| v >= 128), score(truth, visibility).unwrap())
+}
+
+#[test]
+fn bias_tunes_itself() {
+    let lamp = Light { kind: LightKind::Point, position: Vec3::new(0.4, 2.3, 0.5), shadows: ShadowMethod::Map, ..noon() };
+    // Scene, light, eye and where it looks, the worst IoU.
+    let rows = [
+        ("field", field(), sun(Vec3::new(0.5, -0.6, 0.3)), [4.0, 2.0, 7.0], [0.0, 0.5, 0.0], 0.98),
+        ("forest", forest(), sun(Vec3::new(0.4, -1.0, -0.3)), [2.5, 5.0, 6.0], [0.3, 0.0, 0.0], 0.98),
+        ("curved", curved(), sun(Vec3::new(1.0, -0.25, -0.2)), [0.0, 2.5, 5.5], [0.3, 0.5, 0.0], 0.98),
+        ("railings", railings(), sun(Vec3::new(0.3, -1.0, 0.9)), [1.0, 1.8, 5.0], [0.0, 0.3, 1.0], 0.97),
+        ("room", room(), lamp, [-1.5, 1.7, 2.8], [0.2, 0.8, -1.0], 0.98),
+        ("thumb", thumb(), sun(Vec3::new(0.5, -0.8, -0.3)), [0.03, 0.12, 0.25], [0.0, 0.01, 0.0], 0.98),
+    ];
+    let mut failed = Vec::new();
+    for (name, drawables, light, eye, to, least) in rows {
+        let scene = Scene { drawables, lights: vec![light], ..Default::default() };
+        let mut view = look(&format!("bias_{name}"), Vec3::from(eye), Vec3::from(to), [320, 240]);
+        view.frustum = Frustum::symmetric(45f32.to_radians(), 4.0 / 3.0, 0.01);
+        let options = TraceOptions { sub_samples: 2, eps_scale: 1e-7, ..Default::default() };
+        let truth = Tracer::new(&scene).visibility(&scene.lights[0], &view, &options, &|_| ()).unwrap();
+        let shot = shoot(&scene, &Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view) });
+        assert_eq!(shot.problems, Vec::<String>::new());
+        let visibility: Vec<u8> = shot.layers[0].rgba.chunks_exact(4).map(|p| p[0]).collect();
+        let rgba = difference(&truth, &visibility).unwrap();
+        keep(&format!("bias_{name}_difference"), &[umbriel_render::RgbaPixels { rgba, ..shot.layers[0].clone() }]);
+        let (specks, leaks, score) = compared(&truth, &visibility);
+        println!(
+            "{name}: {:.4} % specks, {:.4} % leaks, IoU {:.4}, {:.3} % disagree",
+            specks * 100.0,
+            leaks * 100.0,
+            score.iou,
+            score.disagreement * 100.0
+        );
+        if specks >= 0.0002 || leaks >= 0.0002 || score.iou < least {
+            failed.push(name);
+        }
+    }
+    assert!(failed.is_empty(), "{failed:?}");
+}
+
+/// How much of the light is wrong, in penumbrae and everywhere, by filter.
+#[test]
+fn penumbrae_follow_from_the_size_of_the_light() {
+    let mut drawables =
+        boxes(&[([0.1, 1.5, 0.1], [-0.6, 0.75, 0.0]), ([0.5, 0.5, 0.5], [0.5, 0.25, 0.0]), ([0.6, 0.05, 0.6], [0.2, 1.2, -0.4])]);
+    drawables.push(shape(plane(10.0), grey(), Mat4::IDENTITY));
+    let wide_sun = Light { size: 0.05, ..sun(Vec3::new(0.5, -1.0, 0.4)) };
+    let spot = LightKind::Spot { inner_rad: 0.4, outer_rad: 0.5 };
+    let position = Vec3::new(-1.5, 4.0, -1.2);
+    let lamp = Light { kind: spot, position, direction: -position.normalize(), size: 0.15, shadows: ShadowMethod::Map, ..noon() };
+    for (name, light) in [("sun", wide_sun), ("spot", lamp)] {
+        let scene = Scene { drawables: drawables.clone(), lights: vec![light], ..Default::default() };
+        let view = look(&format!("penumbra_{name}"), Vec3::new(0.5, 3.0, 3.5), Vec3::new(0.2, 0.2, 0.2), [240, 180]);
+        let options = TraceOptions { sub_samples: 1, eps_scale: 1e-6, ..Default::default() };
+        let truth = Tracer::new(&scene).shares(&scene.lights[0], &view, &options, 96, &|_| ()).unwrap();
+        let error = |filter: MapFilter| {
+            let mut scene = scene.clone();
+            scene.lights[0].map.filter = filter;
+            let view = View { name: format!("{}_{filter:?}", view.name), ..view.clone() };
+            let shot = shoot(&scene, &Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view) });
+            let visibility: Vec<u8> = shot.layers[0].rgba.chunks_exact(4).map(|p| p[0]).collect();
+            truth.score(&visibility).unwrap()
+        };
+        let (hard, soft) = (error(MapFilter::Pcf16), error(MapFilter::Pcss));
+        println!(
+            "{name}: share of light wrong in penumbrae: {:.4} by pcss, {:.4} by pcf16; everywhere: {:.4}, {:.4}; {} pixels",
+            soft.penumbra, hard.penumbra, soft.overall, hard.overall, soft.penumbra_pixels
+        );
+        assert!(soft.penumbra_pixels > 500 && soft.penumbra < 0.06 && soft.penumbra < 0.3 * hard.penumbra, "{name}");
+    }
+}
+
+/// A probe that stands still looks at edges of shadows while a head beside it moves by centimetres; maps are fitted to what
+/// the head sees, which is all that the probe sees and more.
+#[test]
+fn edges_stand_still_while_a_head_moves() {
+    let mut drawables = field();
+    drawables.extend(railings());
+    let scene = Scene { drawables, lights: vec![sun(Vec3::new(0.5, -0.8, 0.3))], ..Default::default() };
+    let size = [96, 72];
+    let eye = Vec3::new(1.0, 1.7, 5.0);
+    let target = Vec3::new(0.5, 0.0, 0.8);
+    let mut probe = look("probe", eye, target, size);
+    probe.frustum = Frustum::symmetric(0.3, 4.0 / 3.0, 0.1);
+    let (_turn, gpu) = gpu();
+    for (name, head_at) in [
+        ("sideways", Box::new(|i: f32| eye + Vec3::X * 0.01 * i) as Box<dyn Fn(f32) -> Vec3>),
+        ("ahead", Box::new(|i: f32| eye + (target - eye).normalize() * (0.01 * i - 0.4))),
+        ("around", Box::new(|i: f32| target + glam::Quat::from_rotation_y(0.003 * i) * (eye - target))),
+    ] {
+        let mut renderer = umbriel_render::Renderer::new(gpu).unwrap();
+        let mut before: Option<Vec<u8>> = None;
+        let (mut worst, mut redraws) = (0.0f64, 0);
+        for step in 0..40 {
+            let head =
+                View { frustum: Frustum::symmetric(1.4, 4.0 / 3.0, 0.1), ..look("head", head_at(step as f32), target, [32, 24]) };
+            let pictures = [
+                Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(probe.clone()) },
+                Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(head) },
+            ];
+            redraws += renderer.render(&scene, &pictures).unwrap().map_redraws;
+            let now: Vec<u8> = renderer.read_back(0).unwrap()[0].rgba.chunks_exact(4).map(|p| p[0]).collect();
+            if let Some(before) = before.replace(now.clone()) {
+                let edges: Vec<f64> = before
+                    .iter()
+                    .zip(&now)
+                    .filter(|(a, b)| (1..255).contains(*a) || (1..255).contains(*b) || a != b)
+                    .map(|(a, b)| f64::from(a.abs_diff(*b)))
+                    .collect();
+                assert!(edges.len() > 100, "{name}: {} pixels on edges", edges.len());
+                worst = worst.max(edges.iter().sum::<f64>() / edges.len() as f64 / 255.0);
+            }
+        }
+        println!(
+            "{name}: worst mean change of a pixel on an edge from step to step: {worst:.4}, {redraws} maps drawn in 40 frames"
+        );
+        // One sample of four is a quarter.
+        assert!(worst < 0.1, "{name}: {worst}");
+    }
+}
