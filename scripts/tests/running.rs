@@ -212,3 +212,32 @@ fn two_runs_are_alike() {
     };
     assert_eq!(run(), run());
 }
+
+/// 000 section 4.2: a stencil shadow is made, changed and removed while the world runs.
+#[test]
+fn a_stencil_shadow_comes_changes_and_goes() {
+    use umbriel_scene::{ShadowMethod, StencilMode, VolumeCounting};
+    let mut world = world(
+        "let lamp = make(\"PointLight\", #{ name: \"lamp\", location: vec3(0, 3, 0) }); world.add(lamp);
+         let a = shape(make(\"Box\")); let b = shape(make(\"Sphere\")); let g = ();
+         on_frame(|time| {
+             if time == 1.0 { g = make(\"StencilShadow\", #{ light: lamp, caster: [a], mode: \"modulative\" }); world.add(g); }
+             if time == 2.0 { g.caster = [a, b]; g.mode = \"additive\"; lamp.volume_counting = \"z_fail\"; }
+             if time == 3.0 { delete(g); lamp.shadows = \"volume\"; }
+         });",
+    );
+    let (mut extractor, mut scene) = (umbriel_scenegraph::Extractor::new(), umbriel_scene::Scene::default());
+    let mut seen = Vec::new();
+    for time in 0..4 {
+        world.step(f64::from(time));
+        assert_eq!(problems(&mut world), Vec::<String>::new());
+        extractor.update(world.graph(), &mut scene);
+        let groups: Vec<(usize, bool)> =
+            scene.stencil_groups.iter().map(|g| (g.casters.len(), g.mode == StencilMode::Additive)).collect();
+        seen.push((groups, scene.lights[0].volume.counting == VolumeCounting::ZFail, scene.lights[0].shadows));
+    }
+    let (none, volume) = (ShadowMethod::None, ShadowMethod::Volume);
+    let expected =
+        [(vec![], false, none), (vec![(1, false)], false, none), (vec![(2, true)], true, none), (vec![], true, volume)];
+    assert_eq!(seen, expected);
+}
