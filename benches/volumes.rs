@@ -194,6 +194,7 @@ fn ball_over_floor(world_from_ball: Mat4) -> Scene {
             visible: true,
             casts_shadow: true,
             receives_shadow: true,
+            receives: None,
             revision: 0,
         }
     };

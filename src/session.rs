@@ -182,7 +182,8 @@ impl Session {
 
     /// What to say where a name is no light's.
     pub(crate) fn no_light(&self, name: &str) -> String {
-        let names: Vec<&str> = self.scene.lights.iter().map(|l| l.name.as_str()).filter(|n| !n.is_empty()).collect();
+        let names: Vec<&str> =
+            self.scene.lights.iter().filter(|l| l.shines).map(|l| l.name.as_str()).filter(|n| !n.is_empty()).collect();
         format!("no light '{name}' is on in this world; there are: {}", names.join(", "))
     }
 

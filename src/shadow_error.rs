@@ -94,14 +94,20 @@ fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
     let light = match &args.light {
         Some(name) => session.light_named(name).ok_or_else(|| session.no_light(name))?,
         None => {
-            let casting = lights.iter().position(|l| l.shadows != ShadowMethod::None);
-            casting.or((!lights.is_empty()).then_some(0)).ok_or("the world has no light that is on")?
+            let casting = lights.iter().position(|l| l.shines && l.shadows != ShadowMethod::None);
+            casting.or(lights.iter().position(|l| l.shines)).ok_or("the world has no light that is on")?
         }
     };
     // A world may be a kilometre wide, and its lamps stand centimetres from what casts: rays start close to surfaces.
     let options = TraceOptions { sub_samples: args.sub_samples, eps_scale: 1e-7, ..TraceOptions::default() };
     let problems = session.problems();
-    Ok(Subject { scene: std::mem::take(session.scene_mut()), light, view, options, problems })
+    let mut scene = std::mem::take(session.scene_mut());
+    // The tracer knows no lists of lights.
+    for drawable in &mut scene.drawables {
+        let lists_it = |list: usize| scene.receive_lists.get(list).is_some_and(|lights| lights.contains(&light));
+        drawable.receives_shadow &= drawable.receives.is_none_or(lists_it);
+    }
+    Ok(Subject { scene, light, view, options, problems })
 }
 
 /// The models of a scene file, with its light alone.

@@ -88,6 +88,26 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
             &["sun", "100000", "using 16384"],
         ),
         (
+            "projection_ends_before_it_begins",
+            r#"world.add(make("SpotLight", #{ name: "spot", projectionNear: 5.0, projectionFar: 1.0 }));"#,
+            &["projection_ends_before_it_begins.rhai:4:11", "'spot', projection_far: 1.0 is not beyond projection_near, 5.0"],
+        ),
+        (
+            "up_along_the_light",
+            r#"world.add(make("SpotLight", #{ name: "spot", direction: vec3(0, -1, 0), up: vec3(0, 2, 0) }));"#,
+            &["up_along_the_light.rhai:4:11", "'spot', up", "makes no sense here"],
+        ),
+        (
+            "rectangle_of_no_width",
+            r#"world.add(make("DirectionalLight", #{ name: "sun", projectionRectangle: vec4(1, 0, 1, 2) }));"#,
+            &["rectangle_of_no_width.rhai:4:11", "'sun', projection_rectangle", "makes no sense here"],
+        ),
+        (
+            "projector_without_direction",
+            r#"let c = make("ProjectedTextureCoordinate", #{ name: "slide", projector: make("PointLight") }); let m = make("GeneratedShadowMap"); world.add(shape(make("Box"), make("Appearance", #{ texture: m, texCoord: c })));"#,
+            &["projector_without_direction.rhai:4:9", "'slide', projector: a PointLight has no direction to project along"],
+        ),
+        (
             "missing_texture",
             r#"world.add(shape(make("Box"), make("PhysicalMaterial", #{ base_texture: make("ImageTexture", #{ url: "no.png" }) })));"#,
             &["missing_texture.rhai:4", "no.png"],

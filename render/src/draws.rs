@@ -136,7 +136,8 @@ impl Draws {
         };
         let instance = &mut self.instances[index];
         let world_from_object = d.world_from_object.to_cols_array_2d();
-        let receives = if d.receives_shadow { Instance::RECEIVES_SHADOW } else { 0 };
+        let list = d.receives.map_or(0, |list| (list as u32 + 1) << Instance::RECEIVE_LIST_SHIFT);
+        let receives = if d.receives_shadow { Instance::RECEIVES_SHADOW | list } else { 0 };
         if instance.world_from_object != world_from_object || instance.flags == 0 {
             *instance = instance_of(&d.world_from_object);
         }

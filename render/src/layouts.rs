@@ -20,7 +20,7 @@ impl Layouts {
     pub(crate) fn new(device: &wgpu::Device) -> Layouts {
         let fragment = ShaderStages::FRAGMENT;
         let mut material = vec![buffer(0, fragment, wgpu::BufferBindingType::Uniform)];
-        for slot in 0..5 {
+        for slot in 0..5 + umbriel_scene::Material::MOST_LAYERS as u32 {
             material.push(texture(1 + 2 * slot, wgpu::TextureSampleType::Float { filterable: true }));
             material.push(sampler(2 + 2 * slot, wgpu::SamplerBindingType::Filtering));
         }
@@ -35,6 +35,9 @@ impl Layouts {
             buffer(2, fragment, read),
             maps,
             sampler(4, wgpu::SamplerBindingType::NonFiltering),
+            buffer(5, fragment, read),
+            buffer(6, fragment, read),
+            buffer(7, fragment, read),
         ];
         let unfiltered = wgpu::TextureSampleType::Float { filterable: false };
         let uniform = wgpu::BufferBindingType::Uniform;

@@ -21,6 +21,7 @@ mod lighting;
 mod lights;
 mod maps;
 mod plan;
+mod projection;
 mod read_back;
 mod record;
 mod renderer;

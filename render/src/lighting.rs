@@ -5,6 +5,7 @@ use crate::draws::Draws;
 use crate::layouts::Layouts;
 use crate::lights::{self, Lights};
 use crate::maps::Maps;
+use crate::projection::ProjectionLists;
 use crate::uniforms;
 use glam::Vec3;
 use umbriel_scene::{FogKind, Scene};
@@ -16,6 +17,9 @@ pub(crate) struct Lighting {
     frame: GrowBuffer,
     lights: GrowBuffer,
     faces: GrowBuffer,
+    receive: GrowBuffer,
+    projectors: GrowBuffer,
+    shadow_textures: GrowBuffer,
     instances_group: Option<wgpu::BindGroup>,
     group: Option<wgpu::BindGroup>,
 }
@@ -28,6 +32,9 @@ impl Lighting {
             frame: GrowBuffer::new(device, "surroundings", BufferUsages::UNIFORM, 256),
             lights: storage("lights"),
             faces: storage("map faces"),
+            receive: storage("receive lists"),
+            projectors: storage("projectors"),
+            shadow_textures: storage("shadow textures"),
             instances_group: None,
             group: None,
         }
@@ -48,15 +55,19 @@ impl Lighting {
         lights: &Lights,
         maps: &Maps,
         draws: &Draws,
+        lists: &ProjectionLists,
     ) {
         if self.instances.write(device, queue, bytemuck::cast_slice(&draws.instances)) {
             self.instances_group = None;
         }
-        let list: Vec<uniforms::Light> =
-            lights.order.iter().map(|i| lights::uniform_of(&scene.lights[*i], maps.faces_of(*i))).collect();
-        let mut grown = self.frame.write(device, queue, bytemuck::bytes_of(&frame_of(scene, list.len())));
+        let list: Vec<uniforms::Light> = lights.all().map(|i| lights::uniform_of(&scene.lights[i], maps.faces_of(i))).collect();
+        let frame = frame_of(scene, lights.order.len(), lists.receive_words);
+        let mut grown = self.frame.write(device, queue, bytemuck::bytes_of(&frame));
         grown |= self.lights.write(device, queue, bytemuck::cast_slice(&list));
         grown |= self.faces.write(device, queue, bytemuck::cast_slice(&maps.uniforms()));
+        grown |= self.receive.write(device, queue, bytemuck::cast_slice(&lists.receive));
+        grown |= self.projectors.write(device, queue, bytemuck::cast_slice(&lists.projectors));
+        grown |= self.shadow_textures.write(device, queue, bytemuck::cast_slice(&lists.shadow_textures));
         if grown {
             self.group = None;
         }
@@ -72,6 +83,9 @@ impl Lighting {
                 entry(2, self.faces.buffer.as_entire_binding()),
                 entry(3, wgpu::BindingResource::TextureView(&maps.whole)),
                 entry(4, wgpu::BindingResource::Sampler(&maps.sampler)),
+                entry(5, self.receive.buffer.as_entire_binding()),
+                entry(6, self.projectors.buffer.as_entire_binding()),
+                entry(7, self.shadow_textures.buffer.as_entire_binding()),
             ];
             let layout = &layouts.lighting;
             device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("lighting"), layout, entries })
@@ -91,7 +105,7 @@ fn entry(binding: u32, resource: wgpu::BindingResource<'_>) -> wgpu::BindGroupEn
     wgpu::BindGroupEntry { binding, resource }
 }
 
-fn frame_of(scene: &Scene, light_count: usize) -> uniforms::Frame {
+fn frame_of(scene: &Scene, light_count: usize, receive_words: u32) -> uniforms::Frame {
     let fog = scene.fog.filter(|f| f.visibility_range > 0.0);
     let background = &scene.background;
     uniforms::Frame {
@@ -103,7 +117,8 @@ fn frame_of(scene: &Scene, light_count: usize) -> uniforms::Frame {
         fog_range: fog.map_or(0.0, |f| f.visibility_range),
         fog_kind: u32::from(fog.is_some_and(|f| f.kind == FogKind::Exponential)),
         light_count: light_count as u32,
-        spare: [0; 2],
+        receive_words,
+        spare: 0,
         world_from_room: scene.world_from_room.to_cols_array_2d(),
     }
 }

@@ -11,16 +11,26 @@ pub(crate) struct Lights {
     pub(crate) order: Vec<usize>,
     /// How many of them the surface pass takes.
     pub(crate) in_surface_pass: usize,
+    /// Places of those that do not shine, which follow in the GPU's list: textures show their maps.
+    pub(crate) dark: Vec<usize>,
 }
 
 impl Lights {
     pub(crate) fn new(scene: &Scene) -> Lights {
         let is_masked = |i: usize| scene.lights[i].shadows == ShadowMethod::Volume || has_additive_group(scene, i);
-        let (masked, mut order): (Vec<usize>, Vec<usize>) =
-            (0..scene.lights.len()).filter(|i| shines(&scene.lights[*i])).partition(|i| is_masked(*i));
+        let (masked, mut order): (Vec<usize>, Vec<usize>) = (0..scene.lights.len())
+            .filter(|i| scene.lights[*i].shines && is_sound(&scene.lights[*i]))
+            .partition(|i| is_masked(*i));
         let in_surface_pass = order.len();
         order.extend(masked);
-        Lights { order, in_surface_pass }
+        let dark =
+            scene.shadow_textures.iter().flatten().copied().filter(|i| scene.lights.get(*i).is_some_and(is_sound)).collect();
+        Lights { order, in_surface_pass, dark }
+    }
+
+    /// All lights of the GPU's list, as places in [`Scene::lights`].
+    pub(crate) fn all(&self) -> impl Iterator<Item = usize> + '_ {
+        self.order.iter().chain(&self.dark).copied()
     }
 
     /// Place of a scene's light in the GPU's list.
@@ -29,8 +39,26 @@ impl Lights {
     }
 }
 
-/// Finite numbers and some light: anything else is left out.
-pub(crate) fn shines(light: &Light) -> bool {
+/// Does a light draw maps: for shapes in general, or for those that list it?
+pub(crate) fn draws_map(scene: &Scene, light: usize) -> bool {
+    let is_listed = || scene.receive_lists.iter().any(|list| list.contains(&light));
+    is_sound(&scene.lights[light])
+        && match scene.lights[light].shadows {
+            ShadowMethod::Map => true,
+            ShadowMethod::None => is_listed(),
+            ShadowMethod::Volume => false,
+        }
+}
+
+/// Does the shadow of a light fall on a drawable?
+pub(crate) fn falls_on(scene: &Scene, light: usize, drawable: usize) -> bool {
+    let d = &scene.drawables[drawable];
+    let lists_it = |list: usize| scene.receive_lists.get(list).is_some_and(|list| list.contains(&light));
+    d.receives_shadow && d.receives.is_none_or(lists_it)
+}
+
+/// Finite numbers and a direction: anything else is left out.
+pub(crate) fn is_sound(light: &Light) -> bool {
     let numbers = [light.position, light.direction, light.color, light.attenuation];
     numbers.iter().all(|v| v.is_finite()) && light.intensity.is_finite() && light.direction != Vec3::ZERO
 }
@@ -71,7 +99,7 @@ pub(crate) fn uniform_of(light: &Light, faces: (u32, u32)) -> uniforms::Light {
         constant_bias: map.constant_bias.map_or(-1.0, |b| b.max(0.0)),
         map_flags: map_flags(light, faces.1),
         size: light.size.max(0.0),
-        spare: 0,
+        flags: if light.shadows == ShadowMethod::None { 0 } else { uniforms::Light::CASTS },
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::cull::Planes;
 use crate::draws::{Alpha, Draw, Draws};
-use crate::lights::Lights;
+use crate::lights::{Lights, falls_on};
 use crate::slots::Slots;
 use crate::soft::SoftJob;
 use crate::stats::{FrameStats, Problems};
@@ -10,6 +10,7 @@ use crate::surface::Pass;
 use crate::volumes::Sight;
 use crate::{jobs, uniforms};
 use glam::{Mat4, Vec3};
+use std::collections::HashMap;
 use umbriel_scene::{Layout, Picture, PictureKind, Rect, Scene, View};
 
 /// One view of one picture.
@@ -26,8 +27,6 @@ pub(crate) struct ViewPlan {
     pub(crate) opaque: Vec<Draw>,
     pub(crate) blend_slot: usize,
     pub(crate) blended: Vec<Draw>,
-    /// Those of the opaque shapes that receive no shadows.
-    pub(crate) exempt: Vec<Draw>,
     /// What shadow volumes are chosen by.
     pub(crate) sight: Sight,
     /// Those of the opaque shapes whose own shader makes something of a light's shadow.
@@ -41,6 +40,8 @@ pub(crate) struct Step {
     pub(crate) job: usize,
     /// By a shadow texture, not by the stencil alone: the jobs of its layers.
     pub(crate) soft: Option<Vec<usize>>,
+    /// Those of the opaque shapes on which its light's shadow does not fall.
+    pub(crate) exempt: Vec<Draw>,
     pub(crate) then: Then,
 }
 
@@ -58,6 +59,16 @@ pub(crate) enum Purpose {
     Light(usize),
     /// The film at this number, for the light at this place of the scene.
     Film { film: usize, light: usize },
+}
+
+impl Purpose {
+    /// The light, as a place in the scene.
+    fn light(&self, lights: &Lights) -> usize {
+        match self {
+            Purpose::Light(place) => lights.order[*place],
+            Purpose::Film { light, .. } => *light,
+        }
+    }
 }
 
 /// Number of the film that hides all light.
@@ -148,12 +159,7 @@ pub(crate) fn plan_picture(
             if is_visibility { (Vec::new(), 0) } else { draws.back_to_front(&planes, &view.view_from_world) };
         stats.culled += (outside + blended_outside) as u32;
         stats.views += 1;
-        let exempt = if frame.purposes.is_empty() {
-            Vec::new()
-        } else {
-            let receives = |i: u32| frame.scene.drawables[i as usize].receives_shadow;
-            draws.cull(&planes, |alpha, _, i| alpha != Alpha::Blend && !receives(i)).0
-        };
+        let mut exempt_from = Exempt { scene: frame.scene, planes: &planes, known: HashMap::new() };
         let mut uniform = uniform_of(view, rect, frame.scene.exposure);
         let mut slot_with = |first: usize, count: usize| {
             uniform.first_light = first as u32;
@@ -172,7 +178,8 @@ pub(crate) fn plan_picture(
                 Purpose::Film { film, .. } if !is_visibility => Then::Film { slot: film },
                 _ => continue,
             };
-            steps.push(Step { job, soft: frame.soft[job].as_ref().map(|s| s.layers.clone()), then });
+            let soft = frame.soft[job].as_ref().map(|s| s.layers.clone());
+            steps.push(Step { job, soft, exempt: exempt_from.light(draws, purpose.light(frame.lights)), then });
         }
         let seen = opaque.iter().flat_map(|d| draws.visible_of(d)).map(|i| *i as usize);
         let sight = Sight::new(view, jobs::receivers(seen, frame.scene));
@@ -192,13 +199,28 @@ pub(crate) fn plan_picture(
             blend_slot: slot_with(0, frame.lights.order.len()),
             opaque,
             blended,
-            exempt,
             sight,
             shading_shadow: Vec::new(),
             steps,
         });
     }
     plans
+}
+
+/// Shapes on which a light's shadow does not fall. Lights that no shape lists share one answer.
+struct Exempt<'a> {
+    scene: &'a Scene,
+    planes: &'a Planes,
+    known: HashMap<Option<usize>, Vec<Draw>>,
+}
+
+impl Exempt<'_> {
+    fn light(&mut self, draws: &mut Draws, light: usize) -> Vec<Draw> {
+        let key = (!self.scene.receive_lists.is_empty()).then_some(light);
+        let (scene, planes) = (self.scene, self.planes);
+        let find = || draws.cull(planes, |alpha, _, i| alpha != Alpha::Blend && !falls_on(scene, light, i as usize)).0;
+        self.known.entry(key).or_insert_with(find).clone()
+    }
 }
 
 /// Place in the GPU's list of the light that a visibility picture shows.

@@ -5,7 +5,7 @@ use crate::clock::Clock;
 use crate::deform::Deformer;
 use crate::draws::{Batch, Draw, Kind};
 use crate::maps::Maps;
-use crate::plan::{Then, ViewPlan};
+use crate::plan::{Step, Then, ViewPlan};
 use crate::screen::Screen;
 use crate::slots::Slots;
 use crate::soft::{SoftPass, SoftTarget};
@@ -112,16 +112,22 @@ impl Recorder<'_> {
         for (number, step) in view.steps.iter().enumerate() {
             let is_last = number + 1 == view.steps.len();
             if joins(number) {
-                self.count(&mut pass, view, step.job);
+                self.count(&mut pass, view, (step.job, &step.exempt));
                 self.use_counts(&mut pass, view, &step.then);
                 continue;
             }
             drop(pass);
             if let (Some(layers), Some(soft)) = (&step.soft, &to.soft) {
-                pass = self.soft_step(encoder, view, (&step.then, layers), (to, soft), is_last);
+                pass = self.soft_step(encoder, view, (step, layers), (to, soft), is_last);
                 continue;
             }
-            pass = self.counted(encoder, view, step.job, to, Part { is_first: false, is_last, keeps_stencil: false });
+            pass = self.counted(
+                encoder,
+                view,
+                (step.job, &step.exempt),
+                to,
+                Part { is_first: false, is_last, keeps_stencil: false },
+            );
             self.use_counts(&mut pass, view, &step.then);
         }
         pass.set_bind_group(0, self.views.group(view.blend_slot), &[]);
@@ -133,22 +139,22 @@ impl Recorder<'_> {
         &mut self,
         encoder: &'e mut wgpu::CommandEncoder,
         view: &ViewPlan,
-        job: usize,
+        (job, exempt): (usize, &[Draw]),
         to: &ViewTarget,
         part: Part,
     ) -> wgpu::RenderPass<'e> {
         let mut pass = begin_view(encoder, self.clock, "shadow volumes", to, part);
-        self.count(&mut pass, view, job);
+        self.count(&mut pass, view, (job, exempt));
         pass
     }
 
     /// Counts the volumes of a job, and forgets them where shapes receive no shadow.
-    fn count(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, job: usize) {
+    fn count(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, (job, exempt): (usize, &[Draw])) {
         let drawn = self.volumes.draw(pass, job, self.views.group(view.base_slot), &view.sight);
         self.stats.volumes.add(&drawn);
         pass.set_stencil_reference(0);
         pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
-        self.surfaces(pass, &view.exempt, Pass::Exempt);
+        self.surfaces(pass, exempt, Pass::Exempt);
     }
 
     /// Adds light outside of what was counted, or lays a film inside.
@@ -173,22 +179,28 @@ impl Recorder<'_> {
         &mut self,
         encoder: &'e mut wgpu::CommandEncoder,
         view: &ViewPlan,
-        (then, layers): (&Then, &[usize]),
+        (step, layers): (&Step, &[usize]),
         (to, soft): (&ViewTarget, &SoftTarget),
         is_last: bool,
     ) -> wgpu::RenderPass<'e> {
         for (number, &job) in layers.iter().enumerate() {
-            drop(self.counted(encoder, view, job, to, Part { is_first: false, is_last: false, keeps_stencil: true }));
+            drop(self.counted(
+                encoder,
+                view,
+                (job, &step.exempt),
+                to,
+                Part { is_first: false, is_last: false, keeps_stencil: true },
+            ));
             self.soft.draw(self.device, encoder, self.clock, (job, self.views.group(view.base_slot)), (soft, number == 0));
         }
-        let slot = if let Then::Light { slot } = *then { slot } else { view.base_slot };
+        let slot = if let Then::Light { slot } = step.then { slot } else { view.base_slot };
         let soft_view = self.soft.passes.view_group(self.device, self.views.binding(slot), soft);
-        if let Then::Film { slot } = *then {
+        if let Then::Film { slot } = step.then {
             let groups = (&soft_view, self.films.group(slot));
             self.soft.passes.film(self.device, encoder, self.clock, groups, (soft, &to.samples));
         }
         let mut pass = begin_view(encoder, self.clock, "soft light", to, Part { is_first: false, is_last, keeps_stencil: false });
-        if let Then::Light { .. } = then {
+        if let Then::Light { .. } = step.then {
             pass.set_bind_group(0, &soft_view, &[]);
             self.surfaces(&mut pass, &view.opaque, view.add_pass(true));
         }

@@ -6,9 +6,10 @@ use crate::deform::Deformer;
 use crate::draws::{Caches, Draw, Draws};
 use crate::layouts::Layouts;
 use crate::lighting::Lighting;
-use crate::lights::Lights;
+use crate::lights::{Lights, draws_map};
 use crate::maps::Maps;
 use crate::plan::{self, ViewPlan};
+use crate::projection::{self, ProjectionLists};
 use crate::read_back::{self, GreyPixels, RgbaPixels};
 use crate::record::{Drawer, Recorder};
 use crate::screen::Screen;
@@ -20,7 +21,7 @@ use crate::targets::{Target, ViewTargets};
 use crate::volumes::{Depth, VolumeJob, VolumePass};
 use crate::{Error, Gpu, buffer::GrowBuffer, gpu, jobs, surroundings, uniforms};
 use std::time::Instant;
-use umbriel_scene::{Material, Mesh, Picture, Scene, ShadowMethod};
+use umbriel_scene::{Aabb, Material, Mesh, Picture, Scene};
 
 /// Draws frames.
 pub struct Renderer {
@@ -87,13 +88,14 @@ impl Renderer {
         self.films.clear();
         self.take_drawables(scene);
         let lights = Lights::new(scene);
-        self.choose_maps(scene, pictures);
+        let casters = self.choose_maps(scene, pictures);
         let (mut jobs, purposes) =
             jobs::jobs(scene, &lights, &self.draws, &self.meshes, &self.deformer, &mut self.films, &mut self.problems);
         let soft = soft::soft_jobs(scene, &lights, &purposes, &mut jobs);
         let plans =
             self.plan_views(pictures, &plan::Frame { scene, lights: &lights, purposes: &purposes, soft: &soft }, &mut stats);
-        self.upload(scene, &lights);
+        let lists = projection::lists(scene, pictures, &lights, &self.maps, casters);
+        self.upload(scene, &lights, &lists);
         let prepared = Instant::now();
 
         self.record(&plans, (&jobs, &soft), &mut stats);
@@ -149,18 +151,19 @@ impl Renderer {
         self.draws.sort();
     }
 
-    /// Shadow maps, fitted to all views at once.
-    fn choose_maps(&mut self, scene: &Scene, pictures: &[Picture]) {
+    /// Shadow maps, fitted to all views at once. Gives a box around all casters.
+    fn choose_maps(&mut self, scene: &Scene, pictures: &[Picture]) -> Aabb {
         let around = surroundings::of(scene, pictures, &self.draws);
         let problems = &mut self.problems;
         let revision = |d| self.deformer.get(d).map_or(0, |d| d.revision);
-        let has_maps = scene.lights.iter().any(|l| l.shadows == ShadowMethod::Map);
+        let has_maps = (0..scene.lights.len()).any(|light| draws_map(scene, light));
         let casters = if has_maps { self.draws.casters(&scene.drawables, revision) } else { Vec::new() };
         let is_new = self.maps.choose(&self.gpu.device, scene, &around, casters, |message| problems.report(message));
         if is_new {
             self.lighting.forget_maps();
         }
         self.maps.prepare(&self.gpu.device, &mut self.views, &mut self.draws);
+        around.casters
     }
 
     fn plan_views(&mut self, pictures: &[Picture], frame: &plan::Frame<'_>, stats: &mut FrameStats) -> Vec<ViewPlan> {
@@ -188,7 +191,8 @@ impl Renderer {
             self.view_targets.make(device, &self.layouts.picture, view.size, is_soft, self.frame);
             let mut passes = vec![(view.base_pass(), &view.opaque), (Pass::Blend, &view.blended)];
             if !view.steps.is_empty() {
-                passes.extend([(Pass::Exempt, &view.exempt), (Pass::AddInShadow, &view.shading_shadow)]);
+                passes.push((Pass::AddInShadow, &view.shading_shadow));
+                passes.extend(view.steps.iter().map(|step| (Pass::Exempt, &step.exempt)));
                 passes.extend(view.steps.iter().map(|s| (view.add_pass(s.soft.is_some()), &view.opaque)));
             }
             for (pass, list) in passes {
@@ -201,12 +205,12 @@ impl Renderer {
     }
 
     /// Sends the frame's lists to the GPU.
-    fn upload(&mut self, scene: &Scene, lights: &Lights) {
+    fn upload(&mut self, scene: &Scene, lights: &Lights, lists: &ProjectionLists) {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         self.views.upload(device, queue, &self.layouts.view);
         self.films.upload(device, queue, &self.layouts.film);
         self.visible.write(device, queue, bytemuck::cast_slice(&self.draws.visible));
-        self.lighting.upload(device, queue, &self.layouts, scene, lights, &self.maps, &self.draws);
+        self.lighting.upload(device, queue, &self.layouts, scene, lights, &self.maps, &self.draws, lists);
     }
 
     /// Records and submits: deformation, volumes, maps, views.

@@ -26,6 +26,8 @@ pub(crate) const SURFACE_BEFORE_HOOKS: &[&str] = &[
     include_str!("shaders/brdf.wgsl"),
     include_str!("shaders/shadow_map.wgsl"),
     include_str!("shaders/soft_shadow.wgsl"),
+    include_str!("shaders/projection.wgsl"),
+    include_str!("shaders/layers.wgsl"),
 ];
 
 /// What a shape's own shader may replace; see [`crate::author`].
@@ -137,12 +139,14 @@ mod tests {
             ours!("surface", "Instance", uniforms::Instance, world_from_object world_from_object_normal flags),
             ours!("surface", "Texture", uniforms::Texture, linear offset uv_set present),
             ours!("surface", "Material", uniforms::Material, base_color emissive alpha_cutoff specular exponent metallic
-                roughness normal_scale occlusion_strength ambient shading alpha_mode textures params),
+                roughness normal_scale occlusion_strength ambient shading alpha_mode layer_count textures params layers),
+            ours!("surface", "Layer", uniforms::Layer, linear offset uv_set kind mode projector shadow_texture flags factor),
+            ours!("surface", "ShadowTexture", uniforms::ShadowTexture, light near far),
             ours!("surface", "Light", uniforms::Light, position kind direction range color shadow_intensity ambient cos_outer
-                attenuation cone_scale first_face face_count filter_width slope_bias constant_bias map_flags size),
+                attenuation cone_scale first_face face_count filter_width slope_bias constant_bias map_flags size flags),
             ours!("surface", "MapFace", uniforms::MapFace, map_from_world world_from_map tile light texel depth),
             ours!("surface", "Frame", uniforms::Frame, ambient zenith horizon nadir fog_color fog_range fog_kind light_count
-                world_from_room),
+                receive_words world_from_room),
             ours!("film", "Film", uniforms::Film, color),
             ours!("penumbra", "Source", soft::Source, toward_light size),
             ours!("deform", "Deformation", deform::Uniform, vertex_count target_count joint_count),
@@ -156,7 +160,10 @@ mod tests {
             assert_eq!(members, fields, "{name}");
             // What follows the last field is padding, but an array's stride counts.
             let rounded = size.next_multiple_of(16);
-            assert!(*span as usize == size || *span as usize == rounded || name == "Deformation", "{name}: {span} {size}");
+            assert!(
+                *span as usize == size || *span as usize == rounded || matches!(name, "Deformation" | "ShadowTexture"),
+                "{name}: {span} {size}"
+            );
         }
     }
 }

@@ -1,5 +1,5 @@
 // Surfaces as the eye sees them. Concatenated after shaders/{position,view,instance,material,light,shade,brdf,
-// shadow_map}, and the functions that a shape's own shader may replace (`author/`).
+// shadow_map,projection,layers}, and the functions that a shape's own shader may replace (`author/`).
 
 struct Vertex {
     @location(0) position: vec3<f32>,
@@ -90,6 +90,7 @@ fn place(f: Fragment) -> Surface {
     }
     s.normal = side * n;
     s.receives_shadow = (f.flags & RECEIVES_SHADOW) != 0u;
+    s.base_color = layered(f, s);
     return surface(s);
 }
 
@@ -122,17 +123,21 @@ fn bumped(f: Fragment, n: vec3<f32>, across: vec3<f32>, down: vec3<f32>) -> vec3
 }
 
 // Light of the view's range of lights that the place reflects towards the eye. `shadow` is the share of it that other means
-// than maps let through.
-fn reflected(s: Surface, shadow: f32) -> vec3<f32> {
+// than maps let through, `flags` are the instance's.
+fn reflected(s: Surface, flags: u32, shadow: f32) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
     for (var i = 0u; i < view.light_count; i++) {
-        let light = lights[view.first_light + i];
+        let number = view.first_light + i;
+        let light = lights[number];
         let in_ = incidence(light, s.position);
         if in_.strength <= 0.0 {
             continue;
         }
+        let casts = casts_on(light, number, flags);
+        // Of a light that the surface lists, all is shadowed.
+        let takes_ambient = casts && lists_lights(flags);
         var share = shadow;
-        if light.face_count > 0u && s.receives_shadow {
+        if light.face_count > 0u && casts {
             // What faces away stands in its own shadow.
             var lit = 0.0;
             if dot(s.normal, in_.towards) > 0.0 {
@@ -141,16 +146,20 @@ fn reflected(s: Surface, shadow: f32) -> vec3<f32> {
             share *= 1.0 - light.shadow_intensity * (1.0 - lit);
         }
         sum += shade(s, LightSample(in_.towards, light.color * in_.strength, share, light.kind));
+        if takes_ambient {
+            sum += ambient(s, light.ambient * in_.strength * share);
+        }
     }
     return sum;
 }
 
 // Light that reaches the place from everywhere.
-fn ambient_light(s: Surface) -> vec3<f32> {
+fn ambient_light(s: Surface, flags: u32) -> vec3<f32> {
     var sum = frame.ambient.rgb;
     for (var i = 0u; i < frame.light_count; i++) {
         let light = lights[i];
-        if any(light.ambient > vec3<f32>(0.0)) {
+        let is_shadowed = lists_lights(flags) && casts_on(light, i, flags);
+        if any(light.ambient > vec3<f32>(0.0)) && !is_shadowed {
             sum += light.ambient * incidence(light, s.position).strength;
         }
     }
@@ -158,10 +167,10 @@ fn ambient_light(s: Surface) -> vec3<f32> {
 }
 
 // Linear RGB and opacity.
-fn base(s: Surface) -> vec4<f32> {
+fn base(s: Surface, flags: u32) -> vec4<f32> {
     var lit = s.base_color.rgb;
     if !s.is_unlit {
-        lit = ambient_light(s) + reflected(s, 1.0);
+        lit = ambient_light(s, flags) + reflected(s, flags, 1.0);
     }
     let color = finish(s, lit);
     return vec4<f32>(mix(color.rgb, frame.fog_color, fog_share(s.distance)), color.a);
@@ -171,7 +180,7 @@ fn base(s: Surface) -> vec4<f32> {
 @fragment
 fn opaque(f: Fragment) -> @location(0) vec4<f32> {
     let s = place(f);
-    return vec4<f32>(base(s).rgb, 1.0);
+    return vec4<f32>(base(s, f.flags).rgb, 1.0);
 }
 
 // The same with holes.
@@ -181,14 +190,14 @@ fn masked(f: Fragment) -> @location(0) vec4<f32> {
     if s.base_color.a < material.alpha_cutoff {
         discard;
     }
-    return vec4<f32>(base(s).rgb, 1.0);
+    return vec4<f32>(base(s, f.flags).rgb, 1.0);
 }
 
 // Mixed over what is behind: premultiplied.
 @fragment
 fn blended(f: Fragment) -> @location(0) vec4<f32> {
     let s = place(f);
-    let color = base(s);
+    let color = base(s, f.flags);
     let alpha = saturate(color.a);
     return vec4<f32>(color.rgb * alpha, alpha);
 }
@@ -199,7 +208,7 @@ fn addition(f: Fragment, shadow: f32) -> vec4<f32> {
     if s.is_unlit || (material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff) {
         discard;
     }
-    return vec4<f32>(finished_addition(s, reflected(s, shadow)) * (1.0 - fog_share(s.distance)), 0.0);
+    return vec4<f32>(finished_addition(s, reflected(s, f.flags, shadow)) * (1.0 - fog_share(s.distance)), 0.0);
 }
 
 @fragment
@@ -225,7 +234,7 @@ fn share_through_map(f: Fragment) -> vec4<f32> {
     }
     let light = lights[view.shown_light];
     var lit = 1.0;
-    if light.face_count > 0u && s.receives_shadow {
+    if light.face_count > 0u && casts_on(light, view.shown_light, f.flags) {
         lit = map_visibility(light, f.p_in_world, s.face_normal);
     }
     return vec4<f32>(vec3<f32>(lit), 1.0);

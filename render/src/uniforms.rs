@@ -32,6 +32,8 @@ impl Instance {
     pub(crate) const RECEIVES_SHADOW: u32 = 1;
     /// Its matrix mirrors.
     pub(crate) const MIRRORED: u32 = 2;
+    /// From this bit on, 16 bits are the number of the list of lights that it receives, counted from 1.
+    pub(crate) const RECEIVE_LIST_SHIFT: u32 = 8;
 }
 
 /// `Material` of shaders/material.wgsl.
@@ -50,9 +52,40 @@ pub(crate) struct Material {
     pub(crate) ambient: f32,
     pub(crate) shading: u32,
     pub(crate) alpha_mode: u32,
-    pub(crate) spare: u32,
+    pub(crate) layer_count: u32,
     pub(crate) textures: [Texture; 5],
     pub(crate) params: [[f32; 4]; 16],
+    pub(crate) layers: [Layer; umbriel_scene::Material::MOST_LAYERS],
+}
+
+/// `Layer` of shaders/material.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct Layer {
+    /// Columns of the linear part of `uv_from_mesh`.
+    pub(crate) linear: [f32; 4],
+    pub(crate) offset: [f32; 2],
+    pub(crate) uv_set: u32,
+    pub(crate) kind: u32,
+    pub(crate) mode: u32,
+    pub(crate) projector: u32,
+    pub(crate) shadow_texture: u32,
+    pub(crate) flags: u32,
+    pub(crate) factor: [f32; 4],
+}
+
+/// No place in a list.
+pub(crate) const NOWHERE: u32 = u32::MAX;
+
+/// `ShadowTexture` of shaders/projection.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(crate) struct ShadowTexture {
+    /// Place in the list of lights, or [`NOWHERE`].
+    pub(crate) light: u32,
+    /// Distances of the map, metres.
+    pub(crate) near: f32,
+    pub(crate) far: f32,
 }
 
 /// `Texture` of shaders/material.wgsl.
@@ -87,7 +120,7 @@ pub(crate) struct Light {
     pub(crate) constant_bias: f32,
     pub(crate) map_flags: u32,
     pub(crate) size: f32,
-    pub(crate) spare: u32,
+    pub(crate) flags: u32,
 }
 
 impl Light {
@@ -99,6 +132,8 @@ impl Light {
     pub(crate) const MAP_POISSON: u32 = 4;
     /// Penumbrae from the light's size.
     pub(crate) const MAP_PCSS: u32 = 8;
+    /// Casts on every shape that lists no lights.
+    pub(crate) const CASTS: u32 = 1;
 }
 
 /// `MapFace` of shaders/shadow_map.wgsl.
@@ -130,7 +165,8 @@ pub(crate) struct Frame {
     pub(crate) fog_range: f32,
     pub(crate) fog_kind: u32,
     pub(crate) light_count: u32,
-    pub(crate) spare: [u32; 2],
+    pub(crate) receive_words: u32,
+    pub(crate) spare: u32,
     pub(crate) world_from_room: [[f32; 4]; 4],
 }
 

@@ -31,6 +31,7 @@ pub(crate) fn scene(objects: usize, kinds: usize) -> Scene {
             visible: true,
             casts_shadow: true,
             receives_shadow: true,
+            receives: None,
             revision: 0,
         }
     });

@@ -30,6 +30,7 @@ fn drawable(mesh: Mesh, grey: f32) -> Drawable {
         visible: true,
         casts_shadow: true,
         receives_shadow: true,
+        receives: None,
         revision: 0,
     }
 }

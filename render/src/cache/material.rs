@@ -4,7 +4,7 @@ use super::texture::{make_sampler, make_texture};
 use crate::uniforms;
 use std::collections::HashMap;
 use std::sync::Arc;
-use umbriel_scene::{AlphaMode, Image, Material, Sampler, Shading, TextureRef};
+use umbriel_scene::{AlphaMode, Coordinates, Image, Layer, LayerMode, LayerSource, Material, Sampler, Shading, TextureRef};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 /// A material ready to be drawn with.
@@ -55,12 +55,14 @@ impl MaterialCache {
             (&material.occlusion_texture, false),
             (&material.emissive_texture, true),
         ];
+        let slots = slots.map(|(texture, srgb)| (texture.as_ref(), srgb));
+        let layers: [_; Material::MOST_LAYERS] = std::array::from_fn(|i| (material.layers.get(i).and_then(picture_of), true));
         let mut uniform = uniform_of(material);
         let mut bound = Vec::new();
-        for (i, (texture, srgb)) in slots.into_iter().enumerate() {
-            let sampler = texture.as_ref().map(|t| t.sampler).unwrap_or_default();
+        for (i, (texture, srgb)) in slots.into_iter().chain(layers).enumerate() {
+            let sampler = texture.map(|t| t.sampler).unwrap_or_default();
             let sampler = self.samplers.entry(sampler).or_insert_with(|| make_sampler(device, sampler)).clone();
-            let picture = texture.as_ref().and_then(|t| match self.picture(device, queue, &t.image, srgb) {
+            let picture = texture.and_then(|t| match self.picture(device, queue, &t.image, srgb) {
                 Ok(picture) => Some((picture, slot_of(t))),
                 Err(message) => {
                     report(format!("material '{}': {message}", material.name));
@@ -68,7 +70,9 @@ impl MaterialCache {
                 }
             });
             let (picture, slot) = picture.unwrap_or_else(|| (self.white.clone(), bytemuck::Zeroable::zeroed()));
-            uniform.textures[i] = slot;
+            if let Some(texture) = uniform.textures.get_mut(i) {
+                *texture = slot;
+            }
             bound.push((picture, sampler));
         }
         let contents = bytemuck::bytes_of(&uniform);
@@ -123,6 +127,38 @@ fn slot_of(texture: &TextureRef) -> uniforms::Texture {
     }
 }
 
+fn picture_of(layer: &Layer) -> Option<&TextureRef> {
+    match &layer.source {
+        LayerSource::Picture { texture, .. } => Some(texture),
+        LayerSource::ShadowMap { .. } => None,
+    }
+}
+
+fn layer_of(layer: &Layer) -> uniforms::Layer {
+    let projector = match layer.coordinates {
+        Coordinates::Mesh => uniforms::NOWHERE,
+        Coordinates::Projected(number) => number as u32,
+    };
+    let (kind, place, shadow_texture, flags) = match &layer.source {
+        LayerSource::Picture { texture, border: [u, v] } => (1, slot_of(texture), 0, u32::from(*u) | u32::from(*v) << 1),
+        LayerSource::ShadowMap { texture, compare } => (2, IDENTITY, *texture as u32, (*compare as u32) << 2),
+    };
+    uniforms::Layer {
+        linear: place.linear,
+        offset: place.offset,
+        uv_set: place.uv_set,
+        kind,
+        mode: LayerMode::ALL.iter().position(|m| *m == layer.mode).unwrap_or(0) as u32,
+        projector,
+        shadow_texture,
+        flags,
+        factor: layer.factor.to_array(),
+    }
+}
+
+/// The mesh's own coordinates.
+const IDENTITY: uniforms::Texture = uniforms::Texture { linear: [1.0, 0.0, 0.0, 1.0], offset: [0.0; 2], uv_set: 0, present: 1 };
+
 fn uniform_of(material: &Material) -> uniforms::Material {
     let mut uniform: uniforms::Material = bytemuck::Zeroable::zeroed();
     uniform.base_color = material.base_color.to_array();
@@ -131,6 +167,10 @@ fn uniform_of(material: &Material) -> uniforms::Material {
     uniform.occlusion_strength = material.occlusion_strength;
     uniform.ambient = 1.0;
     uniform.params = material.shader.as_ref().map_or_else(bytemuck::Zeroable::zeroed, crate::author::values_of);
+    uniform.layer_count = material.layers.len().min(Material::MOST_LAYERS) as u32;
+    for (place, layer) in uniform.layers.iter_mut().zip(&material.layers) {
+        *place = layer_of(layer);
+    }
     match material.shading {
         Shading::MetallicRoughness { metallic, roughness } => {
             (uniform.metallic, uniform.roughness, uniform.shading) = (metallic, roughness, 0);

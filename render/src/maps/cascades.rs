@@ -17,7 +17,7 @@ pub(crate) struct Eye {
 /// The maps of a directional light, the finest first. `receivers` and `casters` are boxes in the world.
 pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, casters: Aabb) -> Vec<Fit> {
     let direction = light.direction.normalize_or(Vec3::NEG_Z);
-    let light_from_world = light_from_world(direction);
+    let light_from_world = light_from_world(direction, light.up);
     let make = |window: [f32; 4], near: f32, far: f32, origin: Vec3| {
         let [l, r, b, t] = window;
         let map_from_world = parallel(window, near, far) * light_from_world * Mat4::from_translation(-origin);
@@ -35,9 +35,14 @@ pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, 
     let step = (all.max.z - all.min.z + 2.0 * slack).log2().ceil().exp2() / 16.0;
     let near = ((-all.max.z - slack) / step).floor() * step;
     let far = ((-all.min.z + slack) / step).ceil() * step;
+    // By hand, distances count from the light's place.
+    let at = light_from_world.transform_point3(light.position).z;
+    let [by_hand_near, by_hand_far] = light.map.near_far.unwrap_or([f32::NEG_INFINITY, f32::INFINITY]);
+    let near = if by_hand_near.is_finite() { by_hand_near - at } else { near };
+    let far = if by_hand_far.is_finite() { by_hand_far - at } else { far };
+    let far = if far > near { far } else { near + 1.0 };
     if let Some(window) = light.map.frustum.filter(|[l, r, b, t]| r > l && t > b) {
-        let at = light_from_world.transform_point3(light.position).z;
-        let [near, far] = light.map.near_far.filter(|[n, f]| f > n).unwrap_or([near + at, far + at]);
+        let [near, far] = [near + at, far + at];
         return vec![Fit { projection: make(window, near, far, light.position), needed: None }];
     }
     // A flat floor is a box without height; rounding must not make it vanish.

@@ -3,7 +3,7 @@
 //! maps that it is in reach of.
 
 use super::atlas::Place;
-use super::fit::{Fit, Projection};
+use super::fit::{Fit, Projection, map_frame};
 use crate::cull::{CentredBox, Planes};
 use crate::draws::Caster;
 use glam::{Mat4, Vec3};
@@ -43,6 +43,8 @@ pub(crate) struct Held {
     /// The light when the map was drawn.
     pub(crate) light: Arc<Light>,
     pub(crate) snapshot: Arc<Snapshot>,
+    /// Nobody asked for it yet: nothing casts into it.
+    pub(crate) is_empty: bool,
 }
 
 /// How the casters moved from one snapshot to another.
@@ -119,7 +121,9 @@ impl Held {
         let tolerance = TOLERANCE * self.snapshot.radius.max(1e-3);
         let stayed = |a: Vec3, b: Vec3| (a - b).length() <= tolerance;
         let has_moved_along = stayed(new_from_old.transform_vector3(self.light.direction), light.direction)
-            && stayed(new_from_old.transform_point3(self.light.position), light.position);
+            && stayed(new_from_old.transform_point3(self.light.position), light.position)
+            && self.light.up.is_some() == light.up.is_some()
+            && self.light.up.zip(light.up).is_none_or(|(old, new)| stayed(new_from_old.transform_vector3(old), new));
         if self.light.kind != light.kind || !same_map(&self.light.map, &light.map) || !has_moved_along {
             return None;
         }
@@ -132,6 +136,12 @@ impl Held {
         }
         fit.projection.eye = wanted.projection.eye;
         fit.still_serves(wanted).then_some(fit)
+    }
+
+    /// The map of a light with a position as it lies if it stuck to its light, whatever the casters did.
+    pub(crate) fn with_light(&self, light: &Light) -> Fit {
+        let new_from_old = map_frame(light).inverse() * map_frame(&self.light);
+        Fit { projection: self.fit.projection.carried(&new_from_old), needed: None }
     }
 
     /// Was something in the map's reach before or after it strayed?

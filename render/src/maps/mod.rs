@@ -11,18 +11,19 @@ mod share;
 use crate::clock::Clock;
 use crate::draws::{Caster, Draw, Draws, Kind};
 use crate::layouts::Layouts;
-use crate::lights::shines;
+use crate::lights::draws_map;
 use crate::slots::Slots;
 use crate::stats::MapShare;
 use crate::uniforms;
 use crate::{cull::Planes, shaders};
 pub(crate) use cascades::Eye;
+pub(crate) use fit::projector;
 use fit::{Fit, Projection};
 use keep::{Held, Motion, Snapshot};
 use share::Demand;
 use std::collections::HashMap;
 use std::sync::Arc;
-use umbriel_scene::{Aabb, Light, LightKind, MapUpdate, Scene, ShadowMethod};
+use umbriel_scene::{Aabb, Light, LightKind, MapUpdate, Scene};
 
 const MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
@@ -36,6 +37,8 @@ pub(crate) struct Face {
     draws: Vec<Draw>,
     /// Has to be drawn in this frame.
     is_stale: bool,
+    /// Nothing casts into it: nobody asked for it yet.
+    is_empty: bool,
 }
 
 /// The maps of the frame, and what draws them.
@@ -119,16 +122,15 @@ impl Maps {
         self.shares.clear();
         let limit = device.limits().max_texture_dimension_2d;
         let mut wanted: Vec<Wanted> = Vec::new();
-        for (index, light) in scene.lights.iter().enumerate() {
-            if light.shadows != ShadowMethod::Map || !shines(light) {
-                continue;
-            }
+        for index in (0..scene.lights.len()).filter(|index| draws_map(scene, *index)) {
+            let light = &ranged(&scene.lights[index], around.casters);
             let size = light.map.size.clamp(1, limit);
             if size != light.map.size {
                 report(format!("light '{}': shadow map size {}: using {size}", light.name, light.map.size));
             }
             let fits = fits_of(light, size, around);
             let held = self.held.get(&index).filter(|h| !h.is_empty() && light.map.update == MapUpdate::Never);
+            let held = held.filter(|h| h.iter().all(|h| h.light.map.request == light.map.request));
             let is_frozen = held.is_some_and(|h| light.kind == LightKind::Directional || h.len() == fits.len());
             let faces = held.filter(|_| is_frozen).map_or(fits.len(), Vec::len);
             let level = share::level(light, &around.eyes, self.levels.get(&index).copied());
@@ -145,7 +147,7 @@ impl Maps {
         let mut motions: HashMap<*const Snapshot, Motion> = HashMap::new();
         let mut old = std::mem::take(&mut self.held);
         for (wanted, tiles) in wanted.into_iter().zip(tiles) {
-            let light = &scene.lights[wanted.index];
+            let light = &ranged(&scene.lights[wanted.index], around.casters);
             let old = old.remove(&wanted.index).unwrap_or_default();
             for held in &old {
                 let motion = || keep::motion(&held.snapshot, &snapshot);
@@ -201,25 +203,29 @@ impl Maps {
             let (fit, is_stale) = match (held, carried) {
                 (Some(held), carried) if wanted.is_frozen => {
                     let frozen = || Fit { projection: held.fit.projection.carried(&motion_of(held).new_from_old), needed: None };
-                    let from_light = || if held.fit.projection.eye.w > 0.5 { fits[number].clone() } else { frozen() };
+                    let from_light = || if held.fit.projection.eye.w > 0.5 { held.with_light(light) } else { frozen() };
                     (carried.unwrap_or_else(from_light), !lies_here)
                 }
                 (Some(held), Some(fit)) => {
-                    let is_asked = matches!(light.map.update, MapUpdate::Always | MapUpdate::Next);
+                    let is_asked = matches!(light.map.update, MapUpdate::Always | MapUpdate::Next)
+                        || held.light.map.request != light.map.request;
                     let is_stale = is_asked || !lies_here || Held::is_reached(&fit, &motion_of(held).strays);
                     (fit, is_stale)
                 }
                 _ => (fits[number].clone(), true),
             };
             let (projection, place) = (fit.projection, tile.1);
-            self.faces.push(Face { light: wanted.index, projection, size: tile.0, place, slot: 0, draws: Vec::new(), is_stale });
+            let waits = light.map.update == MapUpdate::Never && light.map.request == Some(0);
+            let is_empty = waits && held.is_none_or(|h| h.is_empty);
+            let (index, draws) = (wanted.index, Vec::new());
+            self.faces.push(Face { light: index, projection, size: tile.0, place, slot: 0, draws, is_stale, is_empty });
             all.push(match held.filter(|_| !is_stale) {
                 // A map that moved along stays as old as it is: deviations do not add up.
                 Some(held) if motion_of(held).is_exact && !wanted.is_frozen => {
                     Held { snapshot: snapshot.clone(), ..held.clone() }
                 }
                 Some(held) => held.clone(),
-                None => Held { fit, tile: *tile, light: now.clone(), snapshot: snapshot.clone() },
+                None => Held { fit, tile: *tile, light: now.clone(), snapshot: snapshot.clone(), is_empty },
             });
         }
         all
@@ -258,6 +264,9 @@ impl Maps {
                 continue;
             }
             face.slot = slots.push(&view_of(&face.projection));
+            if face.is_empty {
+                continue;
+            }
             let planes = Planes::new(&map_from_world);
             face.draws = draws.cull(&planes, |_, casts, _| casts).0;
             for draw in &face.draws {
@@ -279,6 +288,13 @@ impl Maps {
             depth: face.projection.depth,
         };
         self.faces.iter().map(of).collect()
+    }
+
+    /// Near and far distance of the maps of a light with a position, metres; both are finite.
+    pub(crate) fn range_of(&self, light: usize) -> [f32; 2] {
+        let Some(face) = self.faces.iter().find(|f| f.light == light) else { return [0.0, 1.0] };
+        let [offset, scale] = face.projection.depth;
+        [offset / (1.0 + scale), offset / scale.max(1e-9)]
     }
 
     /// Faces of one light: first and count.
@@ -334,10 +350,20 @@ impl Maps {
 
 fn fits_of(light: &Light, size: u32, around: &Surroundings) -> Vec<Fit> {
     match light.kind {
+        LightKind::Directional if !light.shines => fit::whole(light, size, around.casters),
         LightKind::Directional => cascades::cascades(light, size, &around.eyes, around.receivers, around.casters),
         LightKind::Spot { .. } => fit::spot(light, size),
         LightKind::Point => fit::point(light, size),
     }
+}
+
+/// A texture of a map shows grey between distances that are known: those of a light that only draws a map are fitted.
+fn ranged(light: &Light, casters: Aabb) -> Light {
+    let mut light = light.clone();
+    if !light.shines && !casters.is_empty() {
+        light.map.near_far = Some(fit::range(&light, casters));
+    }
+    light
 }
 
 fn view_of(projection: &Projection) -> uniforms::View {

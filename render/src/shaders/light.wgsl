@@ -9,6 +9,8 @@ struct Frame {
     fog_range: f32,
     fog_kind: u32,
     light_count: u32,
+    // Words of each list in `receive_lists`.
+    receive_words: u32,
     // The room's pose in the world, for shaders of authors.
     world_from_room: mat4x4<f32>,
 };
@@ -37,7 +39,10 @@ struct Light {
     map_flags: u32,
     // Of the source: tangent of half the angle under which it is seen (directional), or radius, metres.
     size: f32,
+    flags: u32,
 };
+
+const CASTS: u32 = 1u;
 
 const DIRECTIONAL: u32 = 0u;
 const SPOT: u32 = 1u;

@@ -7,6 +7,21 @@ struct Texture {
     present: u32,
 };
 
+// A texture that is put over the base colour.
+struct Layer {
+    linear: vec4<f32>,
+    offset: vec2<f32>,
+    uv_set: u32,
+    kind: u32,
+    mode: u32,
+    // NOWHERE: the mesh's own coordinates.
+    projector: u32,
+    shadow_texture: u32,
+    // 1, 2: nothing outside of 0..1 across, up. From bit 2 on: what a shadow map gives.
+    flags: u32,
+    factor: vec4<f32>,
+};
+
 struct Material {
     base_color: vec4<f32>,
     emissive: vec3<f32>,
@@ -21,9 +36,11 @@ struct Material {
     ambient: f32,
     shading: u32,
     alpha_mode: u32,
+    layer_count: u32,
     textures: array<Texture, 5>,
     // Of the shape's own shader.
     params: array<vec4<f32>, 16>,
+    layers: array<Layer, 4>,
 };
 
 const METALLIC_ROUGHNESS: u32 = 0u;

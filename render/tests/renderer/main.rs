@@ -6,6 +6,7 @@ mod layouts;
 mod lights;
 mod maps;
 mod outputs;
+mod projection;
 mod shadows;
 mod shapes;
 mod soft;

@@ -42,6 +42,27 @@ pub(crate) fn shoot(scene: &Scene, picture: &Picture) -> Shot {
     Shot { layers, stats, problems }
 }
 
+/// One renderer for many pictures in a row, which is much faster than [`shoot`].
+pub(crate) struct Shooter {
+    renderer: Renderer,
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Shooter {
+    pub(crate) fn new() -> Shooter {
+        let (_turn, gpu) = gpu();
+        Shooter { renderer: Renderer::new(gpu).unwrap(), _turn }
+    }
+
+    /// Draws one picture, and keeps it in a file to look at.
+    pub(crate) fn shoot(&mut self, scene: &Scene, picture: &Picture) -> Shot {
+        let stats = self.renderer.render(scene, std::slice::from_ref(picture)).unwrap();
+        let layers = self.renderer.read_back(0).unwrap();
+        keep(&picture.name, &layers);
+        Shot { layers, stats, problems: self.renderer.problems() }
+    }
+}
+
 /// Writes layers as PNG files into the tests' temporary folder.
 pub(crate) fn keep(name: &str, layers: &[RgbaPixels]) {
     for (i, p) in layers.iter().enumerate() {
@@ -76,6 +97,7 @@ pub(crate) fn shape_of(mesh: &Arc<Mesh>, material: &Arc<Material>, world_from_ob
         visible: true,
         casts_shadow: true,
         receives_shadow: true,
+        receives: None,
         revision: 0,
     }
 }

@@ -12,6 +12,7 @@ mod adjacency;
 mod bounds;
 mod deform;
 pub mod doctor;
+mod layer;
 mod light;
 mod material;
 mod mesh;
@@ -25,6 +26,7 @@ mod volume;
 pub use adjacency::{Edge, Edges};
 pub use bounds::Aabb;
 pub use deform::{Deformed, deformed};
+pub use layer::{Coordinates, Layer, LayerMode, LayerSource, MapCompare, Projector};
 pub use light::{Light, LightKind, MapFilter, MapSettings, MapUpdate, ShadowMethod};
 pub use material::{
     AlphaMode, Filter, FragmentShader, Image, Material, Sampler, ShaderParam, ShaderSource, Shading, TextureRef, Wrap,

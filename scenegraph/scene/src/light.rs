@@ -14,6 +14,11 @@ pub struct Light {
     pub position: Vec3,
     /// Unit vector along which the light travels (from the light into the scene).
     pub direction: Vec3,
+    /// What is above in its map and in what it projects (003 section 4.3); need not be at right angles to `direction`.
+    /// `None`: up in the world.
+    pub up: Option<Vec3>,
+    /// False for a light that only draws its map, for a texture of it (003 section 4.4).
+    pub shines: bool,
     /// Linear RGB colour.
     pub color: Vec3,
     /// Lux for directional lights, candela for the others (as KHR_lights_punctual). A white surface that a directional
@@ -108,8 +113,11 @@ pub struct MapSettings {
     pub size: u32,
     /// Left, right, bottom, top of the light's frustum at distance 1 (spot) or in metres (directional), by hand.
     pub frustum: Option<[f32; 4]>,
-    /// Near and far distance of the light's frustum, metres, by hand.
+    /// Near and far distance of the light's frustum, metres, by hand. One that is not finite is fitted.
     pub near_far: Option<[f32; 2]>,
+    /// A change of this number draws the map once, whatever `update` says. 0: where that says [`MapUpdate::Never`], the map was
+    /// never asked for and starts empty. `None`: it starts drawn.
+    pub request: Option<u32>,
     /// Manual bias that grows with the depth slope, texels (000 displace scale); `None` tunes itself.
     pub slope_bias: Option<f32>,
     /// Manual constant bias, metres (000 displace offset); `None` tunes itself.
@@ -128,6 +136,7 @@ impl Default for MapSettings {
             size: 2048,
             frustum: None,
             near_far: None,
+            request: None,
             slope_bias: None,
             constant_bias: None,
             filter: MapFilter::default(),
@@ -149,6 +158,8 @@ impl Default for Light {
             kind: LightKind::Directional,
             position: Vec3::ZERO,
             direction: Vec3::NEG_Z,
+            up: None,
+            shines: true,
             color: Vec3::ONE,
             intensity: std::f32::consts::PI,
             ambient_intensity: 0.0,

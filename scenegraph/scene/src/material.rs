@@ -1,5 +1,6 @@
 //! Materials, textures and their pictures, and shaders of authors.
 
+use crate::Layer;
 use glam::{Affine2, Vec2, Vec3, Vec4};
 use std::sync::Arc;
 
@@ -28,6 +29,8 @@ pub struct Material {
     pub emissive: Vec3,
     /// Picture of the emission, sRGB; multiplied with `emissive`.
     pub emissive_texture: Option<TextureRef>,
+    /// More textures, each put over the base colour in turn; at most [`Material::MOST_LAYERS`] count.
+    pub layers: Vec<Layer>,
     /// What alpha means.
     pub alpha: AlphaMode,
     /// Visible and lit from both sides; otherwise the side from which a triangle winds counter-clockwise.
@@ -190,6 +193,7 @@ impl Default for Material {
             occlusion_strength: 1.0,
             emissive: Vec3::ZERO,
             emissive_texture: None,
+            layers: Vec::new(),
             alpha: AlphaMode::Opaque,
             double_sided: false,
             shader: None,

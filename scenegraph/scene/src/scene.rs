@@ -1,6 +1,6 @@
 //! What there is to draw.
 
-use crate::{Aabb, Light, Material, Mesh};
+use crate::{Aabb, Light, Material, Mesh, Projector};
 use glam::{Mat4, Vec3, Vec4};
 use std::sync::Arc;
 
@@ -9,8 +9,14 @@ use std::sync::Arc;
 pub struct Scene {
     /// Shapes. A place may be vacant ([`Drawable::visible`] false); places keep their shape as long as it lives.
     pub drawables: Vec<Drawable>,
-    /// Light sources that are switched on.
+    /// Light sources that are switched on, then those that only draw maps ([`Light::shines`]).
     pub lights: Vec<Light>,
+    /// Lists of lights, as places in `lights`, that [`Drawable::receives`] names.
+    pub receive_lists: Vec<Vec<usize>>,
+    /// Projectors of textures, that [`crate::Coordinates::Projected`] names. A place may be vacant.
+    pub projectors: Vec<Option<Projector>>,
+    /// Shadow maps that are textures, that [`crate::LayerSource::ShadowMap`] names: places in `lights`. A place may be vacant.
+    pub shadow_textures: Vec<Option<usize>>,
     /// Groups of casters made by `StencilShadow` nodes.
     pub stencil_groups: Vec<StencilGroup>,
     /// Light that reaches every surface from everywhere, linear RGB.
@@ -33,6 +39,9 @@ impl Default for Scene {
         Scene {
             drawables: Vec::new(),
             lights: Vec::new(),
+            receive_lists: Vec::new(),
+            projectors: Vec::new(),
+            shadow_textures: Vec::new(),
             stencil_groups: Vec::new(),
             ambient: Vec3::ZERO,
             background: Background::default(),
@@ -65,6 +74,9 @@ pub struct Drawable {
     pub casts_shadow: bool,
     /// Shadows fall on it.
     pub receives_shadow: bool,
+    /// The only lights whose shadows fall on it, a place in [`Scene::receive_lists`]: whether they cast on others or not, and
+    /// their ambient light is shadowed too (003 section 4.1). `None`: those of all lights that cast.
+    pub receives: Option<usize>,
     /// Grows with every change of this entry.
     pub revision: u64,
 }

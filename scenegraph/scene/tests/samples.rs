@@ -113,6 +113,7 @@ fn load(path: &Path) -> Scene {
                 visible: true,
                 casts_shadow: true,
                 receives_shadow: true,
+                receives: None,
                 revision: 0,
             });
         }

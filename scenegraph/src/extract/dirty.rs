@@ -107,6 +107,7 @@ impl Extractor {
             Role::User => dirty.head = true,
             Role::Environment => dirty.environment = true,
             Role::ShadowQuad => dirty.stencils = true,
+            Role::ShadowMap => dirty.lights.extend(self.lights.iter().map(|l| l.node)),
             Role::Group | Role::Inert => {}
         }
     }

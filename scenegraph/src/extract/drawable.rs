@@ -107,6 +107,7 @@ impl Slots {
                 bounds_in_world,
                 casts_shadow: state.casts_shadow,
                 receives_shadow: state.receives_shadow,
+                receives: state.receives,
                 revision: 0,
                 mesh,
             };
@@ -163,6 +164,7 @@ fn same(old: &Drawable, new: &Drawable) -> bool {
         && old.bounds_in_world == new.bounds_in_world
         && old.casts_shadow == new.casts_shadow
         && old.receives_shadow == new.receives_shadow
+        && old.receives == new.receives
         && old.pose == new.pose
         && old.name == new.name
 }
@@ -178,6 +180,7 @@ fn vacant() -> Drawable {
         visible: false,
         casts_shadow: false,
         receives_shadow: false,
+        receives: None,
         revision: 0,
     }
 }

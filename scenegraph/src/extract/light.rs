@@ -1,16 +1,16 @@
 //! Light nodes become lights in the room.
 
+use super::map_settings::map_settings;
 use super::problem::Problems;
 use super::read::{Reader, label};
 use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
 use std::f32::consts::PI;
 use umbriel_fields::{Graph, NodeId};
-use umbriel_scene::{
-    Light, LightKind, MapFilter, MapSettings, MapUpdate, ShadowMethod, Silhouettes, VolumeCounting, VolumeSettings,
-};
+use umbriel_scene::{Light, LightKind, ShadowMethod, Silhouettes, VolumeCounting, VolumeSettings};
 
 /// One place of a light in the world.
 pub(super) struct LightEntry {
+    pub(super) node: NodeId,
     /// In the space of its node; None if it is off.
     pub(super) local: Option<Light>,
     /// In the room; None if it is off, hidden, or nowhere.
@@ -24,10 +24,12 @@ const WIDEST_RAD: f32 = PI - 1e-3;
 
 /// Reads a light node in its own space. None if it is off.
 pub(super) fn read_light(graph: &Graph, node: NodeId, problems: &mut Problems) -> Option<Light> {
+    Reader::new(graph, node).get::<bool>("on").then(|| read_any_light(graph, node, problems))
+}
+
+/// The same, on or off.
+pub(super) fn read_any_light(graph: &Graph, node: NodeId, problems: &mut Problems) -> Light {
     let read = Reader::new(graph, node);
-    if !read.get::<bool>("on") {
-        return None;
-    }
     let mut check = Check { graph, node, problems };
     let mut light = Light {
         name: label(graph, node),
@@ -39,7 +41,10 @@ pub(super) fn read_light(graph: &Graph, node: NodeId, problems: &mut Problems) -
         ..Light::default()
     };
     match &*graph.type_of(node).name {
-        "DirectionalLight" => light.direction = read.get("direction"),
+        "DirectionalLight" => {
+            light.direction = read.get("direction");
+            light.position = read.get("projection_location");
+        }
         "PointLight" => {
             light.kind = LightKind::Point;
             light.position = read.get("location");
@@ -65,9 +70,18 @@ pub(super) fn read_light(graph: &Graph, node: NodeId, problems: &mut Problems) -
     }
     light.shadow_intensity *= 1.0 - brightness(&read, &mut check);
     light.size = size(&read, parallel, &mut check);
-    light.map = map_settings(&read, parallel, &mut check);
+    light.up = up(&read, &light, &mut check);
+    light.map = map_settings(&read, &light.kind, &mut check);
     light.volume = volume_settings(&read, &mut check);
-    Some(light)
+    light
+}
+
+/// What is up in the light's map. Along its direction it says nothing.
+fn up(read: &Reader<'_>, light: &Light, check: &mut Check<'_>) -> Option<Vec3> {
+    let along = light.direction.normalize_or_zero();
+    let says_something = |up: &Vec3| up.try_normalize().is_some_and(|up| up.cross(along).length() > 1e-3) || *up == Vec3::ZERO;
+    let up = check.finite("up", read.get("up"), Vec3::ZERO, says_something);
+    (up != Vec3::ZERO).then_some(up)
 }
 
 /// Share of the light that a shadow of this grey keeps: 004 gives greys as they are shown, sRGB encoded.
@@ -120,36 +134,6 @@ fn shadows(read: &Reader<'_>) -> ShadowMethod {
     }
 }
 
-/// In the order of the node's choices.
-const FILTERS: [MapFilter; 6] =
-    [MapFilter::None, MapFilter::Hardware, MapFilter::Pcf4, MapFilter::Pcf16, MapFilter::Poisson, MapFilter::Pcss];
-const UPDATES: [MapUpdate; 4] = [MapUpdate::Auto, MapUpdate::Never, MapUpdate::Always, MapUpdate::Next];
-
-/// Zero means fitted; anything that makes no frustum is reported and fitted.
-fn map_settings(read: &Reader<'_>, parallel: bool, check: &mut Check<'_>) -> MapSettings {
-    let size: i32 = check.finite("shadow_size", read.get("shadow_size"), 2048, |s: &i32| *s > 0);
-    let frustum: Vec4 = read.get("shadow_frustum");
-    let window = |f: &Vec4| f.is_finite() && f.x < f.y && f.z < f.w || *f == Vec4::ZERO;
-    let frustum = check.finite("shadow_frustum", frustum, Vec4::ZERO, window);
-    let near_far: Vec2 = read.get("shadow_near_far");
-    let span = |d: &Vec2| d.is_finite() && d.x < d.y && (parallel || d.x > 0.0) || *d == Vec2::ZERO;
-    let near_far = check.finite("shadow_near_far", near_far, Vec2::ZERO, span);
-    let mut bias = |field: &'static str| {
-        let value = check.finite(field, read.get(field), -1.0, |x: &f32| x.is_finite());
-        (value >= 0.0).then_some(value)
-    };
-    MapSettings {
-        slope_bias: bias("displace_scale"),
-        constant_bias: bias("displace_offset"),
-        size: size as u32,
-        frustum: (frustum != Vec4::ZERO).then(|| frustum.to_array()),
-        near_far: (near_far != Vec2::ZERO).then(|| near_far.to_array()),
-        filter: FILTERS[(read.choice("filter") as usize).min(FILTERS.len() - 1)],
-        update: UPDATES[(read.choice("shadow_update") as usize).min(UPDATES.len() - 1)],
-        outside_in_shadow: read.choice("shadow_outside") == 1,
-    }
-}
-
 fn volume_settings(read: &Reader<'_>, check: &mut Check<'_>) -> VolumeSettings {
     let floor: f32 = check.finite("volume_floor", read.get("volume_floor"), f32::NEG_INFINITY, |h: &f32| *h < f32::INFINITY);
     VolumeSettings {
@@ -163,14 +147,20 @@ fn volume_settings(read: &Reader<'_>, check: &mut Check<'_>) -> VolumeSettings {
 }
 
 /// Reports values that make no sense and gives the usual one instead.
-struct Check<'a> {
-    graph: &'a Graph,
-    node: NodeId,
-    problems: &'a mut Problems,
+pub(super) struct Check<'a> {
+    pub(super) graph: &'a Graph,
+    pub(super) node: NodeId,
+    pub(super) problems: &'a mut Problems,
 }
 
 impl Check<'_> {
-    fn finite<T: std::fmt::Debug + Copy>(&mut self, field: &'static str, value: T, usual: T, fine: impl Fn(&T) -> bool) -> T {
+    pub(super) fn finite<T: std::fmt::Debug + Copy>(
+        &mut self,
+        field: &'static str,
+        value: T,
+        usual: T,
+        fine: impl Fn(&T) -> bool,
+    ) -> T {
         let is_fine = fine(&value);
         let problem = (!is_fine).then(|| format!("{value:?} makes no sense here; {usual:?} is used"));
         self.problems.set(self.graph, self.node, field, problem);
@@ -190,6 +180,7 @@ pub(super) fn place_light(local: &Light, room_from_local: &Mat4, world_per_room:
     if !light.position.is_finite() || stretch == 0.0 {
         return None;
     }
+    light.up = local.up.map(|up| room_from_local.transform_vector3(up));
     light.range *= stretch;
     if local.kind != LightKind::Directional {
         light.size *= stretch;

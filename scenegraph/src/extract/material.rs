@@ -1,11 +1,14 @@
 //! Appearances become materials.
 
+use super::layer::{Stack, layers};
 use super::problem::Problems;
+use super::projection::Projections;
 use super::read::{Reader, name_of, stamp};
 use super::shader::{Shaders, shader};
 use super::texture::{Pictures, texture};
 use glam::{Vec3, Vec4};
 use slotmap::SecondaryMap;
+use std::collections::HashMap;
 use std::sync::Arc;
 use umbriel_fields::{Graph, NodeId, Revision};
 use umbriel_scene::{AlphaMode, Material, Shading, TextureRef};
@@ -15,6 +18,8 @@ use umbriel_scene::{AlphaMode, Material, Shading, TextureRef};
 pub(super) struct CachedMaterial {
     pub(super) material: Arc<Material>,
     pub(super) casts_shadow: bool,
+    /// A place in the scene's lists of lights.
+    pub(super) receives: Option<usize>,
     pub(super) deps: Vec<NodeId>,
     /// It names a shader, which may not be there.
     has_shader: bool,
@@ -24,43 +29,63 @@ pub(super) struct CachedMaterial {
 /// Materials by appearance; an `Arc` stays the same as long as no node it was made of is written.
 pub(super) struct Materials {
     cache: SecondaryMap<NodeId, CachedMaterial>,
+    /// For geometries that say themselves where textures lie: by appearance and geometry.
+    by_geometry: HashMap<(NodeId, NodeId), CachedMaterial>,
     plain: CachedMaterial,
 }
 
 impl Materials {
     pub(super) fn new() -> Materials {
         let material = Arc::new(plain(String::new()));
-        let plain = CachedMaterial { material, casts_shadow: true, deps: Vec::new(), has_shader: false, stamp: (0, 0) };
-        Materials { cache: SecondaryMap::new(), plain }
+        let plain =
+            CachedMaterial { material, casts_shadow: true, receives: None, deps: Vec::new(), has_shader: false, stamp: (0, 0) };
+        Materials { cache: SecondaryMap::new(), by_geometry: HashMap::new(), plain }
     }
 
     pub(super) fn get(
         &mut self,
         graph: &Graph,
         appearance: Option<NodeId>,
-        pictures: &mut Pictures,
-        shaders: &mut Shaders,
-        problems: &mut Problems,
+        geometry: Option<NodeId>,
+        parts: &mut Parts<'_>,
     ) -> CachedMaterial {
         let Some(appearance) = appearance else { return self.plain.clone() };
-        if let Some(known) = self.cache.get(appearance).filter(|c| c.stamp == stamp(graph, &c.deps)) {
+        let own = geometry.filter(|g| !Reader::new(graph, *g).nodes("texture_coordinates").is_empty());
+        let known = match own {
+            Some(geometry) => self.by_geometry.get(&(appearance, geometry)),
+            None => self.cache.get(appearance),
+        };
+        if let Some(known) = known.filter(|c| c.stamp == stamp(graph, &c.deps)) {
             return known.clone();
         }
-        let mut made = make(graph, appearance, pictures, shaders, problems);
+        let mut made = make(graph, appearance, own, parts);
         made.stamp = stamp(graph, &made.deps);
-        self.cache.insert(appearance, made.clone());
+        match own {
+            Some(geometry) => drop(self.by_geometry.insert((appearance, geometry), made.clone())),
+            None => drop(self.cache.insert(appearance, made.clone())),
+        }
         made
     }
 
     /// Every material with a shader is made anew, for the text may be another one.
     pub(super) fn forget_shaders(&mut self) {
         self.cache.retain(|_, cached| !cached.has_shader);
+        self.by_geometry.retain(|_, cached| !cached.has_shader);
     }
 
     /// Forgets materials of dead nodes.
     pub(super) fn sweep(&mut self, graph: &Graph) {
         self.cache.retain(|node, _| graph.contains(node));
+        self.by_geometry.retain(|(appearance, geometry), _| graph.contains(*appearance) && graph.contains(*geometry));
     }
+}
+
+/// Where materials get what they are made of.
+pub(super) struct Parts<'a> {
+    pub(super) pictures: &'a mut Pictures,
+    pub(super) shaders: &'a mut Shaders,
+    pub(super) projections: &'a mut Projections,
+    pub(super) problems: &'a mut Problems,
 }
 
 /// What a shape without a material looks like: matt light grey, as X3D's default Material.
@@ -73,13 +98,7 @@ fn plain(name: String) -> Material {
     }
 }
 
-fn make(
-    graph: &Graph,
-    appearance: NodeId,
-    pictures: &mut Pictures,
-    shaders: &mut Shaders,
-    problems: &mut Problems,
-) -> CachedMaterial {
+fn make(graph: &Graph, appearance: NodeId, geometry: Option<NodeId>, parts: &mut Parts<'_>) -> CachedMaterial {
     let look = Reader::new(graph, appearance);
     let mut deps = vec![appearance];
     let mut made = match look.node("material") {
@@ -87,11 +106,14 @@ fn make(
         Some(node) => {
             deps.push(node);
             let read = Reader::new(graph, node);
-            let mut texture = |field: &str| texture(graph, &read, field, pictures, problems, &mut deps);
+            let mut texture = |field: &str| texture(graph, &read, field, parts.pictures, parts.problems, &mut deps);
             let made = surface(graph, &read, &mut texture);
-            finite_or_plain(graph, node, made, problems)
+            finite_or_plain(graph, node, made, parts.problems)
         }
     };
+    let Stack { base, layers } = layers(&look, geometry, made.base_color_texture.is_none(), parts, &mut deps);
+    made.base_color_texture = base.or(made.base_color_texture);
+    made.layers = layers;
     made.alpha = match look.choice("alpha_mode") {
         1 => AlphaMode::Opaque,
         2 => AlphaMode::Mask { cutoff: look.get("alpha_cutoff") },
@@ -103,11 +125,12 @@ fn make(
     let shader_node = look.node("shader");
     if let Some(node) = shader_node {
         deps.push(node);
-        made.shader = shader(graph, node, (&pictures.asset_root, shaders), problems);
+        made.shader = shader(graph, node, (&parts.pictures.asset_root, parts.shaders), parts.problems);
     }
     let has_shader = shader_node.is_some();
     let casts_shadow = look.get("shadow_caster") && (made.alpha != AlphaMode::Blend || look.get("transparent_caster"));
-    CachedMaterial { material: Arc::new(made), casts_shadow, deps, has_shader, stamp: (0, 0) }
+    let receives = (!look.nodes("receive_shadows").is_empty()).then(|| parts.projections.receive_lists.of(appearance));
+    CachedMaterial { material: Arc::new(made), casts_shadow, receives, deps, has_shader, stamp: (0, 0) }
 }
 
 fn surface(graph: &Graph, read: &Reader<'_>, texture: &mut dyn FnMut(&str) -> Option<TextureRef>) -> Material {

@@ -9,10 +9,13 @@ mod dirty;
 mod drawable;
 mod files;
 mod instance;
+mod layer;
 mod light;
+mod map_settings;
 mod material;
 mod mesh;
 mod problem;
+mod projection;
 mod read;
 mod role;
 mod room;
@@ -37,6 +40,7 @@ use light::{LightEntry, place_light, read_light};
 use material::Materials;
 use mesh::Meshes;
 use problem::Problems;
+use projection::Projections;
 use role::{Role, Types};
 use room::{Globals, Room, read_environment, read_head, read_room, read_viewpoints};
 use shader::Shaders;
@@ -105,6 +109,7 @@ impl Extractor {
             materials: Materials::new(),
             pictures: Pictures::new(PathBuf::from(".")),
             shaders: Shaders::default(),
+            projections: Projections::default(),
             problems: Problems::default(),
         };
         Extractor {
@@ -162,6 +167,7 @@ impl Extractor {
         let touched = self.move_places(graph, &mut dirty, &mut stats);
         let casting = self.write_drawables(scene, touched.shapes, &mut stats);
         let relisted = self.update_lights(graph, scene, &dirty, &touched.lights, &mut stats);
+        self.update_projections(graph, scene);
         if dirty.structure || dirty.stencils || touched.groups || relisted || casting {
             scene.stencil_groups = self.stencil_groups(graph, scene);
         }
@@ -282,7 +288,7 @@ impl Extractor {
                 Role::Viewpoint => self.viewpoint_places.push(place),
                 Role::Light => {
                     instance.slot = self.lights.len() as u32;
-                    self.lights.push(LightEntry { local: None, placed: None, slot: None });
+                    self.lights.push(LightEntry { node: instance.node, local: None, placed: None, slot: None });
                 }
                 _ => {}
             }

@@ -21,6 +21,8 @@ pub(super) enum Role {
     /// Background, Fog, Environment.
     Environment,
     ShadowQuad,
+    /// A GeneratedShadowMap, which may be that of lights.
+    ShadowMap,
     /// Geometry, materials, clocks, and all else that has no place in the world.
     Inert,
 }
@@ -75,6 +77,7 @@ impl Types {
             "User" => Role::User,
             "Background" | "Fog" | "Environment" => Role::Environment,
             "ShadowQuad" => Role::ShadowQuad,
+            "GeneratedShadowMap" => Role::ShadowMap,
             _ if field("children").is_some() => Role::Group,
             _ => Role::Inert,
         };

@@ -140,7 +140,7 @@ pub(super) fn read_viewpoints(graph: &Graph, instances: &Instances, places: &[u3
 }
 
 /// The pose without stretching: a camera stays a camera under a scaled transform. None where there is none.
-fn rigid(m: Mat4) -> Option<Mat4> {
+pub(super) fn rigid(m: Mat4) -> Option<Mat4> {
     let back = m.z_axis.truncate().try_normalize()?;
     let right = m.y_axis.truncate().cross(back).try_normalize()?;
     let up = back.cross(right);

@@ -1,8 +1,9 @@
 //! What a Shape node shows, wherever it stands.
 
-use super::material::Materials;
+use super::material::{Materials, Parts};
 use super::mesh::Meshes;
 use super::problem::Problems;
+use super::projection::Projections;
 use super::read::{Reader, label};
 use super::shader::Shaders;
 use super::skin::{JointBounds, Skin};
@@ -23,6 +24,7 @@ pub(super) struct ShapeState {
     pub(super) visible: bool,
     pub(super) casts_shadow: bool,
     pub(super) receives_shadow: bool,
+    pub(super) receives: Option<usize>,
     pub(super) skin: Option<Skin>,
     /// One per morph target of the mesh.
     pub(super) morph_weights: Vec<f32>,
@@ -43,6 +45,7 @@ pub(super) struct Resources {
     pub(super) materials: Materials,
     pub(super) pictures: Pictures,
     pub(super) shaders: Shaders,
+    pub(super) projections: Projections,
     pub(super) problems: Problems,
 }
 
@@ -95,10 +98,11 @@ impl Shapes {
 
 fn read(graph: &Graph, shape: NodeId, resources: &mut Resources) -> ShapeState {
     let read = Reader::new(graph, shape);
-    let Resources { meshes, materials, pictures, shaders, problems } = resources;
+    let Resources { meshes, materials, pictures, shaders, projections, problems } = resources;
     let geometry = read.node("geometry");
     let cached = geometry.map(|node| meshes.get(graph, node, pictures, problems));
-    let material = materials.get(graph, read.node("appearance"), pictures, shaders, problems);
+    let mut parts = Parts { pictures, shaders, projections, problems };
+    let material = materials.get(graph, read.node("appearance"), geometry, &mut parts);
     let skin_node = read.node("skin");
     let mut deps = cached.as_ref().map(|c| c.deps.clone()).unwrap_or_default();
     deps.extend(&material.deps);
@@ -111,6 +115,7 @@ fn read(graph: &Graph, shape: NodeId, resources: &mut Resources) -> ShapeState {
         visible: read.get("visible"),
         casts_shadow: read.get::<bool>("cast_shadow") && material.casts_shadow,
         receives_shadow: read.get("receive_shadow"),
+        receives: material.receives,
         skin: None,
         morph_weights: morph_weights(&read, joints.as_deref(), problems),
         joints,

@@ -84,6 +84,11 @@ pub(super) fn texture(
 ) -> Option<TextureRef> {
     let node = material.node(field)?;
     deps.push(node);
+    texture_of(graph, node, pictures, problems)
+}
+
+/// The texture that an ImageTexture is. What is broken is reported.
+pub(super) fn texture_of(graph: &Graph, node: NodeId, pictures: &mut Pictures, problems: &mut Problems) -> Option<TextureRef> {
     let read = Reader::new(graph, node);
     let image = picture(&read, pictures, problems, "the surface is shown without it");
     let uv_from_mesh = uv_from_mesh(&read);
@@ -124,7 +129,7 @@ fn uv_from_mesh(read: &Reader<'_>) -> Option<Affine2> {
 }
 
 fn sampler(read: &Reader<'_>) -> Sampler {
-    let wrap = |field: &str| [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp][read.choice(field).min(2) as usize];
+    let wrap = |field: &str| [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp, Wrap::Clamp][read.choice(field).min(3) as usize];
     Sampler {
         wrap_u: wrap("wrap_s"),
         wrap_v: wrap("wrap_t"),

@@ -1,5 +1,6 @@
 //! Solids and meshes.
 
+use super::projection::coordinates;
 use glam::{Vec2, Vec3, Vec4};
 use umbriel_fields::{Field, NodeType};
 
@@ -16,7 +17,7 @@ fn part(name: &'static str, doc: &'static str) -> Field {
 }
 
 pub(super) fn types() -> Vec<NodeType> {
-    let mut types = solids();
+    let mut types: Vec<NodeType> = solids().into_iter().map(|t| t.field(coordinates().alias("tex_coord"))).collect();
     types.extend(meshes());
     types
 }
@@ -75,6 +76,8 @@ fn meshes() -> Vec<NodeType> {
             .field(Field::many::<i32>("joint").doc("Places in the joints of the skin, four per vertex."))
             .field(Field::many::<Vec4>("weight").doc("Weights of the four joints of each vertex."))
             .field(Field::many::<i32>("index").doc("Vertex numbers from 0; empty: the vertices in their order."))
+            // X3D's name `texCoord` is that of the mesh's own coordinates here.
+            .field(coordinates())
             .field(Field::nodes("targets").doc("MorphTargets, in the order of the shape's `morph_weights`.")),
         NodeType::new("MorphTarget", "Offsets that a Mesh adds by weight (blend shape).")
             .field(Field::many::<Vec3>("position").unit("m").doc("Offset of each vertex."))

@@ -1,5 +1,6 @@
 //! Light sources.
 
+use super::projection;
 use glam::{Vec2, Vec3, Vec4};
 use std::f32::consts::PI;
 use umbriel_fields::{Color, Field, NodeType};
@@ -49,6 +50,8 @@ fn common(intensity: f32, unit: &'static str) -> Vec<Field> {
         Field::new("volume_floor", f32::NEG_INFINITY)
             .unit("m")
             .doc("Height below which nothing is seen, such as that of the sea; volumes end there."),
+        Field::node("default_shadow_map")
+            .doc("A GeneratedShadowMap whose size, update, scale and bias the light's map takes (003 section 4.3)."),
         Field::choice("filter", &["none", "hardware", "pcf4", "pcf16", "poisson", "pcss"], "pcf16")
             .doc("How the map is looked up; pcss makes penumbrae that follow from the light's size."),
         Field::choice("shadow_update", &["auto", "none", "always", "next_frame_only"], "auto")
@@ -92,6 +95,9 @@ pub(super) fn types() -> Vec<NodeType> {
         NodeType::new("DirectionalLight", "Parallel light, such as the sun's.")
             .field(direction())
             .field(angular_diameter())
+            .fields(projection::of_light())
+            .field(projection::up())
+            .fields(projection::of_parallel_light())
             .fields(common(PI, "lx")),
         NodeType::new("SpotLight", "A cone of light.")
             .field(place("location").alias("position"))
@@ -101,12 +107,16 @@ pub(super) fn types() -> Vec<NodeType> {
             .field(attenuation(Vec3::Z))
             .field(radius())
             .field(light_radius())
+            .fields(projection::of_light())
+            .field(projection::up())
+            .field(projection::angle())
             .fields(common(100.0, "cd")),
         NodeType::new("PointLight", "Light into all directions.")
             .field(place("location").alias("position"))
             .field(attenuation(Vec3::Z))
             .field(radius())
             .field(light_radius())
+            .fields(projection::of_light())
             .fields(common(100.0, "cd")),
         NodeType::new("LightSource", "The light of OpenGL Performer and AVANGO (000 section 4.1): its place decides its kind.")
             .alias("fpLightSource")
@@ -114,6 +124,7 @@ pub(super) fn types() -> Vec<NodeType> {
             .field(Field::new("position", Vec4::Z).unit("m").alias("location").doc(
                 "w = 1: a place to shine from. w = 0: parallel light that comes from this direction.",
             ))
+            .field(projection::up())
             .field(Field::new("spot_dir", Vec3::NEG_Z).alias("direction").doc("Where the cone and the shadow map point to."))
             .field(Field::new("spot_cone", Vec2::new(0.0, 180.0)).doc(
                 "Fall-off exponent from the axis (0: even) and half angle of the cone in degrees (180: no cone), as in Performer.",

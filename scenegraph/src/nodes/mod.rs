@@ -9,6 +9,7 @@ mod geometry;
 mod group;
 mod light;
 mod material;
+pub(crate) mod projection;
 mod shape;
 mod skin;
 mod sky;
@@ -25,6 +26,7 @@ pub fn node_types() -> Vec<NodeType> {
         shape::types(),
         material::types(),
         texture::types(),
+        projection::types(),
         geometry::types(),
         skin::types(),
         light::types(),

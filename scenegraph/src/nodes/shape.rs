@@ -1,5 +1,6 @@
 //! Shape, Appearance, and shaders of authors.
 
+use super::projection;
 use umbriel_fields::{Field, NodeType};
 
 pub(super) fn types() -> Vec<NodeType> {
@@ -14,6 +15,14 @@ pub(super) fn types() -> Vec<NodeType> {
             .field(Field::new("receive_shadow", true).doc("Shadows fall on it.")),
         NodeType::new("Appearance", "How a shape looks.")
             .field(Field::node("material").doc("A PhysicalMaterial, Material or UnlitMaterial."))
+            .field(Field::nodes("texture").alias("textures").doc(
+                "ImageTextures, GeneratedShadowMaps and MultiTextures, put over the material's base colour one after the other.",
+            ))
+            .field(projection::coordinates().alias("tex_coord"))
+            .field(Field::nodes("receive_shadows").doc(
+                "The only lights whose shadows fall on it, whether or not they cast on others; all their light is shadowed, ambient too \
+                 (003 section 4.1). None: the lights that cast.",
+            ))
             .field(
                 Field::choice("alpha_mode", &["auto", "opaque", "mask", "blend"], "auto")
                     .doc("What alpha means. auto: blend if the material is transparent, else opaque."),

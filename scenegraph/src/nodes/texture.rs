@@ -5,13 +5,17 @@ use std::sync::Arc;
 use umbriel_fields::{Field, Image, NodeType};
 
 pub(super) fn types() -> Vec<NodeType> {
-    let wrap = |name: &'static str, doc: &'static str| Field::choice(name, &["repeat", "mirror", "clamp"], "repeat").doc(doc);
+    let wrap =
+        |name: &'static str, doc: &'static str| Field::choice(name, &["repeat", "mirror", "clamp", "border"], "repeat").doc(doc);
     vec![
         NodeType::new("ImageTexture", "A picture on a surface, from memory or from a file.")
             .alias("PixelTexture")
             .field(Field::new("url", "").doc("File below the asset root; used where `image` is empty."))
             .field(Field::new("image", None::<Arc<Image>>).doc("The picture itself, RGBA."))
-            .field(wrap("wrap_s", "What is left and right of the picture."))
+            .field(wrap(
+                "wrap_s",
+                "What is left and right of the picture; border: nothing, where a texture of an Appearance says so.",
+            ))
             .field(wrap("wrap_t", "What is above and below the picture."))
             .field(Field::choice("filter", &["linear", "nearest"], "linear").doc("How texels are interpolated."))
             .field(Field::new("mip_maps", true).doc("Use smaller copies of the picture for far surfaces."))

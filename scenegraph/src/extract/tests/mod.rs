@@ -3,6 +3,7 @@
 mod cost;
 mod lights;
 mod looks;
+mod projection;
 mod random;
 mod skins;
 mod stencils;

@@ -163,8 +163,7 @@ fn the_light_of_the_paper() {
         size: 512,
         frustum: Some([-0.5, 0.5, -0.5, 0.5]),
         near_far: Some([0.01, 100.0]),
-        slope_bias: None,
-        constant_bias: None,
+        filter: MapFilter::Pcf16,
         ..MapSettings::default()
     };
     assert_eq!(found.map, expected);

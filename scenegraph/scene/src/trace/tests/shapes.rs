@@ -19,6 +19,7 @@ pub(super) fn drawable(mesh: Mesh, world_from_object: Mat4) -> Drawable {
         visible: true,
         casts_shadow: true,
         receives_shadow: true,
+        receives: None,
         revision: 0,
     }
 }
