@@ -173,7 +173,7 @@ fn a_generated_map_is_drawn_as_its_update_says() {
     let light = w.below(&[w.root()], "SpotLight", "lamp");
     let map = w.node("GeneratedShadowMap", "map");
     w.set(light, "default_shadow_map", map);
-    let mut frame = |w: &mut World, update: Option<&str>| {
+    let frame = |w: &mut World, update: Option<&str>| {
         if let Some(update) = update {
             w.set(map, "update", update);
         }
