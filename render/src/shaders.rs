@@ -27,13 +27,13 @@ pub(crate) const SURFACE_BEFORE_HOOKS: &[&str] = &[
     include_str!("shaders/shadow_map.wgsl"),
     include_str!("shaders/soft_shadow.wgsl"),
     include_str!("shaders/projection.wgsl"),
-    include_str!("shaders/layers.wgsl"),
 ];
 
 /// What a shape's own shader may replace; see [`crate::author`].
 pub(crate) const HOOKS: &str = include_str!("shaders/hooks.wgsl");
 
-pub(crate) const SURFACE_BEHIND_HOOKS: &str = include_str!("surface.wgsl");
+/// Layers need the surface's fragment, which shaders of authors do not see.
+pub(crate) const SURFACE_BEHIND_HOOKS: &str = concat!(include_str!("shaders/layers.wgsl"), include_str!("surface.wgsl"));
 
 /// The shader of surfaces that bring none of their own.
 pub(crate) fn surface() -> String {
