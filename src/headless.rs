@@ -16,7 +16,7 @@ pub(crate) const DESKTOP_SIZE: [u32; 2] = [1280, 720];
 
 /// Draws the frames that were asked for. Gives the number of problems that were reported meanwhile.
 pub(crate) fn run(args: &Run) -> Result<usize, Failure> {
-    let mut session = Session::open(&args.path)?;
+    let mut session = Session::open(&args.path)?.wait_for_casters();
     if let Some(file) = &args.record {
         session.record(file)?;
     }

@@ -46,7 +46,7 @@ fn compare(mut replay: Replay) -> Result<usize, Failure> {
 
 fn draw(replay: Replay, args: &cli::Replay, out: &Path) -> Result<usize, Failure> {
     let frames = replay.position() as u32..replay.frames() as u32;
-    let mut session = Session::replay(replay, &args.file);
+    let mut session = Session::replay(replay, &args.file).wait_for_casters();
     let wanted = headless::Wanted { view: args.view.as_deref(), size: args.size, shadow_of: None, out };
     // A recording has its own times.
     Ok(headless::draw(&mut session, frames, |_| 0.0, &wanted)?.problems)

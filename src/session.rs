@@ -38,6 +38,8 @@ pub(crate) struct Session {
     scene: Scene,
     rig: Rig,
     generation: u64,
+    /// Frames wait until reduced casters are made.
+    waits: bool,
     navigation: Option<NavigationNode>,
     /// What was reported and not yet told.
     problems: Vec<String>,
@@ -69,14 +71,23 @@ impl Session {
         Session {
             path: path.to_path_buf(),
             generation: source.generation(),
+            waits: false,
             source,
             recording: None,
-            extractor: extractor_beside(path),
+            extractor: extractor_beside(path, false),
             scene: Scene::default(),
             rig: Rig::new(),
             navigation: None,
             problems: Vec::new(),
         }
+    }
+
+    /// The same frames on every machine: reduced casters are made before they are wanted, not beside the frames. Before the
+    /// first step.
+    pub(crate) fn wait_for_casters(mut self) -> Session {
+        self.waits = true;
+        self.extractor = extractor_beside(&self.path, true);
+        self
     }
 
     /// Records every frame from now on.
@@ -120,7 +131,7 @@ impl Session {
     fn extract(&mut self) {
         if self.source.generation() != self.generation {
             self.generation = self.source.generation();
-            self.extractor = extractor_beside(&self.path);
+            self.extractor = extractor_beside(&self.path, self.waits);
             self.scene = Scene::default();
             self.navigation = None;
             self.rig.refit();
@@ -291,9 +302,10 @@ pub(crate) fn bounds(scene: &Scene) -> Aabb {
     scene.drawables.iter().filter(|d| d.visible).fold(Aabb::EMPTY, |b, d| b.union(d.bounds_in_world))
 }
 
-fn extractor_beside(path: &Path) -> Extractor {
+fn extractor_beside(path: &Path, waits: bool) -> Extractor {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    Extractor::new().with_asset_root(folder)
+    let extractor = Extractor::new().with_asset_root(folder);
+    if waits { extractor.with_ready_casters() } else { extractor }
 }
 
 #[cfg(test)]

@@ -52,6 +52,9 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
         tracing::error!("{problem}");
     }
     let score = score(&truth, &visibility)?;
+    if let Some(reduced) = reduced_casters(&subject.scene) {
+        println!("{reduced}");
+    }
     if let Some(path) = &args.diff {
         let [width, height] = subject.view.size;
         png::write(path, &RgbaPixels { width, height, rgba: difference(&truth, &visibility)? }, &by)?;
@@ -79,7 +82,7 @@ impl From<Method> for ShadowMethod {
 }
 
 fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
-    let mut session = Session::open(path)?;
+    let mut session = Session::open(path)?.wait_for_casters();
     if args.time > 0.0 {
         session.step(0.0);
     }
@@ -157,7 +160,8 @@ fn read_mask(path: &Path, size: [u32; 2]) -> Result<Mask, Failure> {
 
 fn trace(subject: &Subject) -> Result<Mask, Failure> {
     let bar = progress(subject.view.size[1], "rows traced");
-    let tracer = Tracer::new(&subject.scene);
+    // The truth knows no reduced casters.
+    let tracer = Tracer::new(&subject.scene.with_full_casters());
     let light = &subject.scene.lights[subject.light];
     let mask = tracer.visibility(light, &subject.view, &subject.options, &|rows| bar.set_position(rows.into()));
     bar.finish_and_clear();
@@ -169,12 +173,23 @@ const DISC_RAYS: usize = 256;
 
 fn trace_shares(subject: &Subject) -> Result<Shares, Failure> {
     let bar = progress(subject.view.size[1], "rows of penumbra traced");
-    let tracer = Tracer::new(&subject.scene);
+    let tracer = Tracer::new(&subject.scene.with_full_casters());
     let light = &subject.scene.lights[subject.light];
     let options = TraceOptions { sub_samples: subject.options.sub_samples.min(2), ..subject.options.clone() };
     let shares = tracer.shares(light, &subject.view, &options, DISC_RAYS, &|rows| bar.set_position(rows.into()));
     bar.finish_and_clear();
     Ok(shares?)
+}
+
+/// What reduced casters save and how wrong they are, where there are any.
+fn reduced_casters(scene: &Scene) -> Option<String> {
+    let triangles = |place: usize| scene.drawables.get(place).map_or(0, |d| d.mesh.triangle_count());
+    let sum = |place: fn(&umbriel_scene::StandIn) -> usize| scene.stand_ins.iter().map(|s| triangles(place(s))).sum::<usize>();
+    let (few, all) = (sum(|s| s.place), sum(|s| s.of));
+    let measured = scene.stand_ins.iter().map(|s| s.error_m).filter(|e| e.is_finite()).fold(f32::NEG_INFINITY, f32::max);
+    let bound = if measured.is_finite() { format!(", at most {measured:.5} m from the shown") } else { String::new() };
+    let count = scene.stand_ins.len();
+    (count > 0).then(|| format!("reduced casters: {count}, {few} of {all} triangles{bound}; scored against the full ones"))
 }
 
 /// One byte per pixel, and the device that drew it.

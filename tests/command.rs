@@ -336,3 +336,26 @@ fn maps_drawn_once_rest_afterwards() {
         assert_eq!(run.ok, is_fine, "{second}: {}{}", run.stdout, run.stderr);
     }
 }
+
+#[test]
+fn reduced_casters_are_scored_against_full_ones() {
+    let world = folder("command").join("reduced.rhai");
+    let script = r#"
+let ball = shape(make("Sphere", #{ radius: 1.0, segments: 64 }));
+ball.caster = make("ReducedCaster", #{ max_error: 0.03 });
+world.add(transform(#{ translation: vec3(0, 1.5, 0) }, [ball]));
+world.add(shape(make("Plane", #{ size: vec2(12, 12) })));
+world.add(make("DirectionalLight", #{ direction: vec3(0.3, -1, -0.2), shadows: "volume" }));
+world.add(make("Viewpoint", #{ position: vec3(0, 4, 8), orientation: axis_angle(vec3(1, 0, 0), -0.4) }));
+"#;
+    std::fs::write(&world, script).expect("a world can be written");
+    let world = world.to_str().expect("paths are text");
+    for method in ["volume", "map"] {
+        let run = umbriel(&["shadow-error", world, "--method", method, "--size", "320x240", "--sub-samples", "2"]);
+        assert!(run.ok && run.stdout.contains("reduced casters: 1, "), "{method}: {}{}", run.stdout, run.stderr);
+        let share = run.stdout.split("disagreement=").nth(1).and_then(|t| t.split('%').next()?.parse::<f32>().ok());
+        // Some pixels differ, or the full caster would have been drawn; the shadow is there, and the ball is not in it.
+        assert!(share.is_some_and(|s| s > 0.0 && s < 2.0), "{method}: {}", run.stdout);
+        println!("{method}: {}", run.stdout);
+    }
+}

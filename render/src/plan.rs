@@ -141,6 +141,8 @@ pub(crate) fn plan_picture(
     limit: u32,
 ) -> Vec<ViewPlan> {
     let mut plans = Vec::new();
+    let mut unseen: Vec<usize> = frame.scene.stand_ins.iter().map(|s| s.place).collect();
+    unseen.sort_unstable();
     for (index, view) in picture.views.iter().enumerate() {
         let Some((rect, layer, channels)) = place_of(picture, index) else {
             problems.report(format!("picture '{}': view '{}' has no place inside of it", picture.name, view.name));
@@ -153,13 +155,14 @@ pub(crate) fn plan_picture(
         let shown = shown_light(picture, frame, problems);
         let clip_from_world = view.frustum.clip_from_view() * view.view_from_world;
         let planes = Planes::new(&clip_from_world);
-        let (opaque, outside) = draws.cull(&planes, |alpha, _, _| alpha != Alpha::Blend);
+        let is_seen = |i: u32| unseen.binary_search(&(i as usize)).is_err();
+        let (opaque, outside) = draws.cull(&planes, |alpha, _, i| alpha != Alpha::Blend && is_seen(i));
         let is_visibility = picture.kind != PictureKind::Colour;
         let (blended, blended_outside) =
             if is_visibility { (Vec::new(), 0) } else { draws.back_to_front(&planes, &view.view_from_world) };
         stats.culled += (outside + blended_outside) as u32;
         stats.views += 1;
-        let mut exempt_from = Exempt { scene: frame.scene, planes: &planes, known: HashMap::new() };
+        let mut exempt_from = Exempt { scene: frame.scene, planes: &planes, is_seen: &is_seen, known: HashMap::new() };
         let mut uniform = uniform_of(view, rect, frame.scene.exposure);
         let mut slot_with = |first: usize, count: usize| {
             uniform.first_light = first as u32;
@@ -211,14 +214,16 @@ pub(crate) fn plan_picture(
 struct Exempt<'a> {
     scene: &'a Scene,
     planes: &'a Planes,
+    is_seen: &'a dyn Fn(u32) -> bool,
     known: HashMap<Option<usize>, Vec<Draw>>,
 }
 
 impl Exempt<'_> {
     fn light(&mut self, draws: &mut Draws, light: usize) -> Vec<Draw> {
         let key = (!self.scene.receive_lists.is_empty()).then_some(light);
-        let (scene, planes) = (self.scene, self.planes);
-        let find = || draws.cull(planes, |alpha, _, i| alpha != Alpha::Blend && !falls_on(scene, light, i as usize)).0;
+        let (scene, planes, is_seen) = (self.scene, self.planes, self.is_seen);
+        let find =
+            || draws.cull(planes, |alpha, _, i| alpha != Alpha::Blend && is_seen(i) && !falls_on(scene, light, i as usize)).0;
         self.known.entry(key).or_insert_with(find).clone()
     }
 }

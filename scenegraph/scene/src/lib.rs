@@ -11,11 +11,13 @@
 mod adjacency;
 mod bounds;
 mod deform;
+mod distance;
 pub mod doctor;
 mod layer;
 mod light;
 mod material;
 mod mesh;
+mod reduce;
 mod scene;
 mod score;
 mod tangents;
@@ -32,7 +34,8 @@ pub use material::{
     AlphaMode, Filter, FragmentShader, Image, Material, Sampler, ShaderParam, ShaderSource, Shading, TextureRef, Wrap,
 };
 pub use mesh::{Mesh, MeshError, MorphTarget, Topology};
-pub use scene::{Background, Drawable, Film, Fog, FogKind, Pose, Scene, StencilGroup, StencilMode};
+pub use reduce::{ReduceError, ReducedMesh, reduce};
+pub use scene::{Background, Drawable, Film, Fog, FogKind, Pose, Scene, StandIn, StencilGroup, StencilMode};
 pub use score::{Score, difference, score};
 pub use tangents::tangents;
 pub use trace::{Mask, MaskError, PenumbraScore, Shares, TraceError, TraceOptions, Tracer, trace_visibility};

@@ -9,6 +9,8 @@ use std::sync::Arc;
 pub struct Scene {
     /// Shapes. A place may be vacant ([`Drawable::visible`] false); places keep their shape as long as it lives.
     pub drawables: Vec<Drawable>,
+    /// Which of them are reduced casters: never seen, they throw the shadows of others.
+    pub stand_ins: Vec<StandIn>,
     /// Light sources that are switched on, then those that only draw maps ([`Light::shines`]).
     pub lights: Vec<Light>,
     /// Lists of lights, as places in `lights`, that [`Drawable::receives`] names.
@@ -38,6 +40,7 @@ impl Default for Scene {
     fn default() -> Scene {
         Scene {
             drawables: Vec::new(),
+            stand_ins: Vec::new(),
             lights: Vec::new(),
             receive_lists: Vec::new(),
             projectors: Vec::new(),
@@ -79,6 +82,33 @@ pub struct Drawable {
     pub receives: Option<usize>,
     /// Grows with every change of this entry.
     pub revision: u64,
+}
+
+/// A drawable that throws a shadow in place of another one, and is not seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StandIn {
+    /// The one that casts: a place in [`Scene::drawables`].
+    pub place: usize,
+    /// The one that is seen, and does not cast.
+    pub of: usize,
+    /// How far the two surfaces are apart at most, in the space of the object, metres; NaN where nobody measured it.
+    pub error_m: f32,
+}
+
+impl Scene {
+    /// Shadows as if there were no reduced casters: what these are scored against.
+    pub fn with_full_casters(&self) -> Scene {
+        let mut scene = self.clone();
+        for stand_in in scene.stand_ins.drain(..) {
+            if let Some(d) = scene.drawables.get_mut(stand_in.place) {
+                d.visible = false;
+            }
+            if let Some(d) = scene.drawables.get_mut(stand_in.of) {
+                d.casts_shadow = true;
+            }
+        }
+        scene
+    }
 }
 
 /// Deformation of one drawable.

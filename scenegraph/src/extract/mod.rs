@@ -17,11 +17,13 @@ mod mesh;
 mod problem;
 mod projection;
 mod read;
+mod reducer;
 mod role;
 mod room;
 mod shader;
 mod shape;
 mod skin;
+mod stand_in;
 mod stencil;
 mod sweep;
 mod texture;
@@ -111,6 +113,8 @@ impl Extractor {
             shaders: Shaders::default(),
             projections: Projections::default(),
             problems: Problems::default(),
+            reducer: Default::default(),
+            unseen: Default::default(),
         };
         Extractor {
             last: None,
@@ -141,6 +145,13 @@ impl Extractor {
         self
     }
 
+    /// Reduced casters are made before the frame that wants them, however long that takes; otherwise they come when a thread
+    /// has made them, and shapes cast themselves until then.
+    pub fn with_ready_casters(mut self) -> Extractor {
+        self.resources.reducer.waits = true;
+        self
+    }
+
     /// At most so many places in the world; a graph of shared nodes may have more paths than memory. 1 000 000 at first.
     pub fn with_place_limit(mut self, places: usize) -> Extractor {
         self.limit = places;
@@ -152,7 +163,10 @@ impl Extractor {
     pub fn update(&mut self, graph: &Graph, scene: &mut Scene) -> ExtractStats {
         let mut dirty = self.gather(graph);
         dirty.shapes.extend(self.reread.drain(..));
-        if scene.drawables.len() != self.slots.places.len() {
+        if self.resources.reducer.poll() {
+            dirty.shapes.extend(&self.shapes.with_caster);
+        }
+        if scene.drawables.len() != self.slots.places.len() + scene.stand_ins.len() {
             dirty.everything();
         }
         if dirty.is_empty() {
@@ -161,11 +175,14 @@ impl Extractor {
         let mut stats = ExtractStats { rebuilt: dirty.structure, ..ExtractStats::default() };
         self.update_room(graph, &mut dirty);
         if dirty.structure {
+            scene.drawables.truncate(self.slots.places.len());
             self.recompile(graph, scene, &mut dirty);
         }
         self.refresh_shapes(graph, &mut dirty, &mut stats);
         let touched = self.move_places(graph, &mut dirty, &mut stats);
-        let casting = self.write_drawables(scene, touched.shapes, &mut stats);
+        let mut casting = self.write_drawables(scene, touched.shapes, &mut stats);
+        casting |=
+            stand_in::place(scene, self.slots.places.len(), &self.instances, &self.shapes, self.head, &self.resources.unseen);
         let relisted = self.update_lights(graph, scene, &dirty, &touched.lights, &mut stats);
         self.update_projections(graph, scene);
         if dirty.structure || dirty.stencils || touched.groups || relisted || casting {
@@ -273,6 +290,7 @@ impl Extractor {
         self.resources.meshes.sweep(graph);
         self.resources.materials.sweep(graph);
         self.resources.pictures.sweep();
+        self.resources.reducer.sweep();
     }
 
     /// Lists lights, LODs, groups and viewpoints of a newly compiled list.

@@ -5,8 +5,10 @@ use super::mesh::Meshes;
 use super::problem::Problems;
 use super::projection::Projections;
 use super::read::{Reader, label};
+use super::reducer::Reducer;
 use super::shader::Shaders;
 use super::skin::{JointBounds, Skin};
+use super::stand_in::{self, Caster};
 use super::texture::Pictures;
 use slotmap::SecondaryMap;
 use std::collections::BTreeSet;
@@ -21,6 +23,8 @@ pub(super) struct ShapeState {
     pub(super) mesh: Option<Arc<Mesh>>,
     pub(super) joints: Option<Arc<JointBounds>>,
     pub(super) material: Arc<Material>,
+    /// What casts in its place; none while it is being made.
+    pub(super) caster: Option<Caster>,
     pub(super) visible: bool,
     pub(super) casts_shadow: bool,
     pub(super) receives_shadow: bool,
@@ -36,6 +40,8 @@ pub(super) struct ShapeState {
 #[derive(Default)]
 pub(super) struct Shapes {
     pub(super) states: SecondaryMap<NodeId, ShapeState>,
+    /// Those that name a caster.
+    pub(super) with_caster: BTreeSet<NodeId>,
     users: SecondaryMap<NodeId, BTreeSet<NodeId>>,
 }
 
@@ -47,6 +53,9 @@ pub(super) struct Resources {
     pub(super) shaders: Shaders,
     pub(super) projections: Projections,
     pub(super) problems: Problems,
+    pub(super) reducer: Reducer,
+    /// Of what is never seen.
+    pub(super) unseen: Arc<Material>,
 }
 
 impl Shapes {
@@ -58,6 +67,11 @@ impl Shapes {
     /// Reads a shape anew. True if its skin is another one now, so that joints must be found again.
     pub(super) fn refresh(&mut self, graph: &Graph, shape: NodeId, resources: &mut Resources) -> bool {
         let state = read(graph, shape, resources);
+        if Reader::new(graph, shape).node("caster").is_some() {
+            self.with_caster.insert(shape);
+        } else {
+            self.with_caster.remove(&shape);
+        }
         let before = self.states.remove(shape);
         let old_deps = before.as_ref().map_or(&[][..], |b| &b.deps);
         if old_deps != state.deps {
@@ -80,6 +94,7 @@ impl Shapes {
     pub(super) fn retain(&mut self, keep: impl Fn(NodeId) -> bool) {
         let gone: Vec<NodeId> = self.states.keys().filter(|id| !keep(*id)).collect();
         for shape in gone {
+            self.with_caster.remove(&shape);
             for dep in self.states.remove(shape).map(|s| s.deps).unwrap_or_default() {
                 self.forget_use(dep, shape);
             }
@@ -98,7 +113,7 @@ impl Shapes {
 
 fn read(graph: &Graph, shape: NodeId, resources: &mut Resources) -> ShapeState {
     let read = Reader::new(graph, shape);
-    let Resources { meshes, materials, pictures, shaders, projections, problems } = resources;
+    let Resources { meshes, materials, pictures, shaders, projections, problems, reducer, .. } = resources;
     let geometry = read.node("geometry");
     let cached = geometry.map(|node| meshes.get(graph, node, pictures, problems));
     let mut parts = Parts { pictures, shaders, projections, problems };
@@ -107,11 +122,22 @@ fn read(graph: &Graph, shape: NodeId, resources: &mut Resources) -> ShapeState {
     let mut deps = cached.as_ref().map(|c| c.deps.clone()).unwrap_or_default();
     deps.extend(&material.deps);
     deps.extend(skin_node);
+    let caster_node = read.node("caster");
+    let caster = caster_node.and_then(|node| {
+        let given = Reader::new(graph, node);
+        deps.push(node);
+        deps.extend((&*graph.type_of(node).name == "ReducedCaster").then(|| given.node("geometry")).flatten());
+        let shown = cached.as_ref().and_then(|c| c.mesh.as_ref());
+        stand_in::read(graph, shape, node, shown, reducer, problems, |node, problems| {
+            meshes.get(graph, node, pictures, problems).mesh
+        })
+    });
     let joints = cached.as_ref().and_then(|c| c.joints.clone());
     let mut state = ShapeState {
         name: label(graph, shape),
         mesh: cached.and_then(|c| c.mesh),
         material: material.material,
+        caster,
         visible: read.get("visible"),
         casts_shadow: read.get::<bool>("cast_shadow") && material.casts_shadow,
         receives_shadow: read.get("receive_shadow"),

@@ -58,15 +58,19 @@ fn casters(read: &Reader<'_>, instances: &Instances, place: u32, scene: &Scene) 
         if named.contains(&instance.node) {
             inside_until = inside_until.max(instance.end);
         }
-        if at < inside_until && casts(instance, scene) {
-            out.push(instance.slot as usize);
+        if at < inside_until {
+            out.extend(caster_of(instance, scene));
         }
     }
     out
 }
 
-fn casts(instance: &Instance, scene: &Scene) -> bool {
-    instance.role == Role::Shape && scene.drawables.get(instance.slot as usize).is_some_and(|d| d.visible && d.casts_shadow)
+/// The drawable that casts for a shape: its own, or the one that stands in for it.
+fn caster_of(instance: &Instance, scene: &Scene) -> Option<usize> {
+    let slot = instance.slot as usize;
+    let drawable = scene.drawables.get(slot).filter(|d| instance.role == Role::Shape && d.visible)?;
+    let stand_in = || scene.stand_ins.binary_search_by_key(&slot, |s| s.of).ok().map(|i| scene.stand_ins[i].place);
+    if drawable.casts_shadow { Some(slot) } else { stand_in() }
 }
 
 fn film(stencil: &Reader<'_>) -> Film {

@@ -10,9 +10,27 @@ pub(super) fn types() -> Vec<NodeType> {
             .field(Field::node("appearance").doc("An Appearance; none is matt light grey."))
             .field(Field::node("skin").doc("A Skin that bends the mesh by its joints."))
             .field(Field::many::<f32>("morph_weights").doc("Share of each morph target of the mesh."))
+            .field(
+                Field::node("caster").doc("Casts in its place, unseen: a geometry, or a ReducedCaster; none: it casts itself."),
+            )
             .field(Field::new("visible", true).doc("Drawn, and casting shadows."))
             .field(Field::new("cast_shadow", true).doc("Throws shadows."))
             .field(Field::new("receive_shadow", true).doc("Shadows fall on it.")),
+        NodeType::new(
+            "ReducedCaster",
+            "Fewer triangles that throw the shadow of a Shape, by maps and by volumes (000 future work).",
+        )
+        .field(Field::node("geometry").doc("A closed geometry a little smaller than what is shown; none: it is made."))
+        .field(
+            Field::new("max_error", 0.0f32)
+                .unit("m")
+                .doc("How far what is made may be from what is shown; 0: a hundredth of its size."),
+        )
+        .field(
+            Field::new("angle", 0.0f32)
+                .unit("rad")
+                .doc("Used where the user's head sees the error under less than this; 0: always."),
+        ),
         NodeType::new("Appearance", "How a shape looks.")
             .field(Field::node("material").doc("A PhysicalMaterial, Material or UnlitMaterial."))
             .field(Field::nodes("texture").alias("textures").doc(

@@ -158,7 +158,7 @@ impl Tracer {
     fn first_seen(&self, ray: &Ray, cull: bool) -> Option<Hit> {
         self.soup.first(ray, |hit| {
             let shape = &self.soup.shapes[self.soup.triangles[hit.triangle].shape as usize];
-            !shape.blend && (hit.front || shape.double_sided || !cull) && self.soup.is_there(hit)
+            shape.seen && !shape.blend && (hit.front || shape.double_sided || !cull) && self.soup.is_there(hit)
         })
     }
 

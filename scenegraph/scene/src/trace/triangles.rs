@@ -24,6 +24,8 @@ pub(super) struct Soup {
 
 /// What a ray has to know of a drawable.
 pub(super) struct Shape {
+    /// By eyes; what stands in for others is not.
+    pub(super) seen: bool,
     pub(super) casts: bool,
     pub(super) receives: bool,
     pub(super) double_sided: bool,
@@ -41,14 +43,17 @@ impl Soup {
             max: DVec3::NEG_INFINITY,
             slack: 0.0,
         };
-        for drawable in scene.drawables.iter().filter(|d| d.visible && d.mesh.topology == Topology::Triangles) {
-            soup.add(drawable);
+        let unseen: std::collections::HashSet<usize> = scene.stand_ins.iter().map(|s| s.place).collect();
+        for (place, drawable) in scene.drawables.iter().enumerate() {
+            if drawable.visible && drawable.mesh.topology == Topology::Triangles {
+                soup.add(drawable, !unseen.contains(&place));
+            }
         }
         soup.build();
         soup
     }
 
-    fn add(&mut self, drawable: &Drawable) {
+    fn add(&mut self, drawable: &Drawable, seen: bool) {
         let (mesh, material) = (&drawable.mesh, &drawable.material);
         let world_from_object = drawable.world_from_object.as_dmat4();
         let positions: Cow<'_, [Vec3]> = match &drawable.pose {
@@ -72,6 +77,7 @@ impl Soup {
             }
         }
         self.shapes.push(Shape {
+            seen,
             casts: drawable.casts_shadow,
             receives: drawable.receives_shadow,
             double_sided: material.double_sided,

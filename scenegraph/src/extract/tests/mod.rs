@@ -6,6 +6,7 @@ mod looks;
 mod projection;
 mod random;
 mod skins;
+mod stand_ins;
 mod stencils;
 mod tree;
 mod types;
