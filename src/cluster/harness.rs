@@ -41,7 +41,7 @@ struct Open {
 pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
     let mut session = Session::open(&args.path)?;
     let shows = shows(&args.path, args.channels)?;
-    for fault in args.fault.iter().filter(|fault| !shows.contains(&fault.display)) {
+    if let Some(fault) = args.fault.iter().find(|fault| !shows.contains(&fault.display)) {
         return Err(format!("there is no display `{}` to break; there are: {}", fault.display, shows.join(", ")).into());
     }
     let address = free_address()?;
