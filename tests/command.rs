@@ -36,7 +36,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
     let truncated = folder("command").join("truncated.glb");
     std::fs::write(&truncated, b"glTF\x02\0\0\0\xff\0\0\0").expect("a file can be written");
     // Name, line of the world, what the message must contain. The rest of the world is drawn.
-    let rows: [(&str, &str, &[&str]); 21] = [
+    let rows: [(&str, &str, &[&str]); 25] = [
         (
             "negative_soft_range",
             r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "volume", soft: "range", soft_range: -1.0 }));"#,

@@ -115,6 +115,7 @@ fn drawable(mesh: Mesh, material: &Arc<Material>, world_from_object: Mat4) -> Dr
         visible: true,
         casts_shadow: false,
         receives_shadow: false,
+        receives: None,
         revision: 0,
     }
 }

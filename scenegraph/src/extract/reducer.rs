@@ -11,13 +11,18 @@ pub(super) type Made = Result<(Arc<Mesh>, f32), ReduceError>;
 /// By mesh and bound. The weak pointer keeps the address from being used again.
 type Key = (*const Mesh, u32);
 
+/// A mesh and the error that is allowed, metres.
+type Order = (Arc<Mesh>, f32);
+/// Both ends of the thread that makes them.
+type Worker = (Sender<Order>, Receiver<(Order, Made)>);
+
 /// What is being made, and what was.
 #[derive(Default)]
 pub(super) struct Reducer {
     /// Makes them at once: pictures that must not depend on how fast a thread is.
     pub(super) waits: bool,
     known: HashMap<Key, (Weak<Mesh>, Option<Made>)>,
-    worker: Option<(Sender<(Arc<Mesh>, f32)>, Receiver<(Arc<Mesh>, f32, Made)>)>,
+    worker: Option<Worker>,
 }
 
 impl Reducer {
@@ -41,7 +46,7 @@ impl Reducer {
     pub(super) fn poll(&mut self) -> bool {
         let Some((_, finished)) = &self.worker else { return false };
         let mut any = false;
-        for (mesh, max_error_m, made) in finished.try_iter() {
+        for ((mesh, max_error_m), made) in finished.try_iter() {
             self.known.insert((Arc::as_ptr(&mesh), max_error_m.to_bits()), (Arc::downgrade(&mesh), Some(made)));
             any = true;
         }
@@ -58,13 +63,13 @@ fn make(mesh: &Mesh, max_error_m: f32) -> Made {
     reduce(mesh, max_error_m).map(|made| (Arc::new(made.mesh), made.error_m))
 }
 
-fn start() -> (Sender<(Arc<Mesh>, f32)>, Receiver<(Arc<Mesh>, f32, Made)>) {
-    let (orders, to_do) = channel::<(Arc<Mesh>, f32)>();
+fn start() -> Worker {
+    let (orders, to_do) = channel::<Order>();
     let (done, finished) = channel();
     std::thread::spawn(move || {
         for (mesh, max_error_m) in to_do {
             let made = make(&mesh, max_error_m);
-            if done.send((mesh, max_error_m, made)).is_err() {
+            if done.send(((mesh, max_error_m), made)).is_err() {
                 break;
             }
         }

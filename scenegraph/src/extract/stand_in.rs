@@ -102,6 +102,7 @@ pub(super) fn place(
             visible: true,
             casts_shadow: true,
             receives_shadow: false,
+            receives: None,
             revision: shown.revision,
         };
         scene.stand_ins.push(StandIn { place: scene.drawables.len(), of: slot, error_m: caster.error_m });
