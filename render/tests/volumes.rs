@@ -181,16 +181,11 @@ impl Random {
     }
 }
 
+/// 60 places, or as many as a long check wants: `UMBRIEL_EYES=600 cargo test -p umbriel-render --test volumes the_eye`.
 #[test]
 fn the_eye_anywhere() {
-    eyes(60, &mut both(), VolumeCounting::Auto);
-}
-
-/// As many positions as a long check wants: `cargo test -p umbriel-render --test volumes -- --ignored`.
-#[test]
-#[ignore = "minutes"]
-fn the_eye_in_six_hundred_places() {
-    eyes(600, &mut both(), VolumeCounting::Auto);
+    let wanted = std::env::var("UMBRIEL_EYES").map_or(60, |count| count.parse().expect("UMBRIEL_EYES is a number of places"));
+    eyes(wanted, &mut both(), VolumeCounting::Auto);
 }
 
 /// Depth that runs from 0 to 1 - epsilon (002), and depth that the device clamps.

@@ -3,9 +3,9 @@
 //! The one idea: every triangle is turned to face the light and casts its own volume; what neighbours share cancels
 //! before anything is drawn, because each edge carries the signed sum of its triangles (Kim, Kim, Turk 2008). Closed
 //! meshes leave their silhouette, open borders count once, edges of n faces count what they must. Volumes reach to
-//! infinity by w = 0 in world space (002), or until nothing is left that receives ([`reach`]). They are made once per
+//! infinity by w = 0 in world space (002), or until nothing is left that receives (`reach`). They are made once per
 //! frame and light; each view then counts them in front of the visible surface where that is safe and behind it
-//! elsewhere, and leaves out what it cannot see ([`choose`]).
+//! elsewhere, and leaves out what it cannot see (`choose`).
 //!
 //! After [`VolumePass::draw`] the stencil is not 0 exactly where the job's light is hidden by one of the job's casters.
 //! The stencil counts layers of shadow in eight bits. Jobs that may hold more are drawn in groups of at most 127 layers,
