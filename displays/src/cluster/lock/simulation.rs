@@ -267,10 +267,16 @@ impl Simulation {
     }
 
     fn display_handles(&mut self, place: usize, message: Message) {
+        // As displays do: a run of the application is made known before its first packet is kept.
+        if let Message::Frame { epoch, .. } = message
+            && epoch > self.displays[place].lock.epoch()
+        {
+            self.display_steps(place, DisplayEvent::Release { epoch, frame: 0, is_mine: false });
+        }
         let display = &mut self.displays[place];
         let event = match message {
             Message::Frame { epoch, frame, world } => {
-                if epoch >= display.lock.epoch() {
+                if epoch == display.lock.epoch() {
                     display.packets.insert(frame, (epoch, world));
                 }
                 DisplayEvent::Frame { epoch, frame }
@@ -328,7 +334,7 @@ impl Simulation {
                     self.tally.shown += 1;
                     self.shows(place, epoch, frame);
                 }
-                DisplayAction::Forget => display.packets.retain(|_, (of, _)| *of == epoch && display.lock.follows()),
+                DisplayAction::Forget => display.packets.clear(),
             }
         }
     }
@@ -382,6 +388,9 @@ impl Simulation {
         self.run_until(healed_us + frozen_us);
         self.now_us = healed_us + frozen_us;
         let awake_us = self.now_us;
+        // What was lost before shows within the timeout.
+        self.run_until(awake_us + 2 * TIMEOUT_US);
+        self.now_us = awake_us + 2 * TIMEOUT_US;
         while self.now_us < awake_us + 2_000_000 && !self.all_show() {
             let next_us = self.now_us + TICK_US;
             self.run_until(next_us);

@@ -12,6 +12,8 @@ pub(super) struct Beam {
     position: Option<DVec3>,
     /// Cosine of the cone's half angle, for a spot.
     cone: Option<f64>,
+    /// How far it shines, metres.
+    range: f64,
 }
 
 impl Beam {
@@ -30,6 +32,7 @@ impl Beam {
                 LightKind::Spot { outer_rad, .. } => Some(f64::from(outer_rad).cos()),
                 LightKind::Directional | LightKind::Point => None,
             },
+            range: if needs_position { f64::from(light.range) } else { f64::INFINITY },
         })
     }
 
@@ -41,7 +44,8 @@ impl Beam {
         if far > 0.0 { (to_light / far, far) } else { (facing, 0.0) }
     }
 
-    pub(super) fn is_outside_of_cone(&self, to_light: DVec3) -> bool {
-        self.cone.is_some_and(|cosine| -to_light.dot(self.direction) < cosine)
+    /// Is a place out of its reach: outside of the cone, or beyond the range?
+    pub(super) fn misses(&self, to_light: DVec3, far: f64) -> bool {
+        far > self.range || self.cone.is_some_and(|cosine| -to_light.dot(self.direction) < cosine)
     }
 }

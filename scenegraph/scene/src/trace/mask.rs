@@ -45,7 +45,7 @@ impl Mask {
     pub const SHADOW: u8 = 2;
     /// The surface faces away from the light, or grazes it.
     pub const AWAY: u8 = 3;
-    /// Outside of the spot's cone.
+    /// Outside of the spot's cone, or beyond the light's range.
     pub const OUTSIDE: u8 = 4;
     /// The samples of the pixel disagree.
     pub const MIXED: u8 = 255;

@@ -97,8 +97,8 @@ impl Tracer {
     }
 
     /// Traces what `light` does in each pixel of `view`, on all cores. Rays start at the eye, in front of the near plane
-    /// too. Range and attenuation of the light do not count; a shape that receives no shadows is lit where it faces the
-    /// light. `progress` hears the number of rows that are done, from any thread.
+    /// too. Attenuation of the light does not count, its range does: what lies beyond is outside. A shape that receives
+    /// no shadows is lit where it faces the light. `progress` hears the number of rows that are done, from any thread.
     pub fn visibility(
         &self,
         light: &Light,
@@ -142,7 +142,7 @@ impl Tracer {
         let point = eye + direction * distance;
         let facing = if normal.dot(direction) > 0.0 { -normal } else { normal };
         let (to_light, far) = beam.to_light(point, facing);
-        let class = if beam.is_outside_of_cone(to_light) {
+        let class = if beam.misses(to_light, far) {
             Mask::OUTSIDE
         } else if facing.dot(to_light) <= options.graze {
             Mask::AWAY

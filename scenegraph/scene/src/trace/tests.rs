@@ -74,6 +74,13 @@ fn spots_have_cones() {
         (vec3(0.0, 9.0, 5.0), vec3(0.5, 2.0, 0.5), LIT),
     ];
     check("spot", &world, &spot(vec3(0.0, 4.0, 0.0), 0.5), &rows);
+    let short = Light { range: 4.0, ..spot(vec3(0.0, 4.0, 0.0), 0.5) };
+    check(
+        "range",
+        &world,
+        &short,
+        &[(vec3(0.0, 9.0, 5.0), vec3(1.5, 0.0, 0.0), OUTSIDE), (vec3(0.0, 9.0, 5.0), vec3(0.5, 2.0, 0.5), LIT)],
+    );
     check("outside first", &world, &spot(vec3(0.0, 4.0, 0.0), 0.1), &[(vec3(8.0, 1.0, 0.0), vec3(1.0, 0.1, 0.0), OUTSIDE)]);
 }
 
