@@ -33,8 +33,8 @@ pub(crate) fn goldens() -> Result<(), String> {
 pub(crate) fn test() -> Result<(), String> {
     let rows = [
         "fmt --all --check",
-        "clippy --workspace --all-targets -- --deny warnings",
-        "doc --workspace --no-deps --document-private-items",
+        "clippy --workspace --all-targets --features cluster -- --deny warnings",
+        "doc --workspace --no-deps --document-private-items --features cluster",
         "test --workspace --no-fail-fast --features cluster",
     ];
     for row in rows {
