@@ -20,10 +20,10 @@ pub(crate) enum Store<'a> {
 impl Store<'_> {
     /// The value of a field of this type.
     #[inline]
-    fn get<T: FieldValue>(&self, slot: u32) -> T {
+    fn read<T: FieldValue>(&self, slot: u32) -> &T {
         match self {
-            Store::All { columns, .. } => T::column(columns).values[slot as usize].clone(),
-            Store::Apart { values, .. } => T::stretch(values).value(slot).clone(),
+            Store::All { columns, .. } => &T::column(columns).values[slot as usize],
+            Store::Apart { values, .. } => T::stretch(values).value(slot),
         }
     }
 
@@ -99,12 +99,19 @@ impl Evaluation<'_> {
         self.time_s
     }
 
+    /// The value of a field of exactly this type, where it lies; for lists, which need not be counted as held then.
+    #[inline]
+    pub fn read<T: FieldValue>(&self, index: u16) -> Option<&T> {
+        self.node.field(index).filter(|field| field.field_type == T::TYPE)?;
+        Some(self.store.read(self.node.slots[index as usize]))
+    }
+
     /// The value of a field, converted if it is asked for as another type that converts. What cannot be read is reported and reads as empty.
     pub fn get<T: FieldValue>(&mut self, index: u16) -> T {
         if let Some(field) = self.node.field(index) {
             let slot = self.node.slots[index as usize];
             if field.field_type == T::TYPE {
-                return self.store.get(slot);
+                return self.store.read::<T>(slot).clone();
             }
             let value = self.store.value(field.field_type, slot);
             if let Some(value) = value.convert(T::TYPE).as_ref().and_then(T::from_value) {
@@ -150,6 +157,16 @@ impl Evaluation<'_> {
     /// The declarations of the node's fields with their places.
     pub fn fields(&self) -> impl Iterator<Item = (u16, &Field)> {
         self.node.fields()
+    }
+
+    /// Fields have places below this; those of removed fields are empty.
+    pub fn places(&self) -> u16 {
+        self.node.slots.len() as u16
+    }
+
+    /// True if there is a field at a place.
+    pub fn has(&self, index: u16) -> bool {
+        self.node.field(index).is_some()
     }
 
     /// The place of a field by its name; for dynamic fields.

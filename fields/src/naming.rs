@@ -31,10 +31,17 @@ pub fn canonical(name: &str) -> String {
 /// The known name that is most like the given one, if any is alike at all.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let name = canonical(name);
+    let alike = |candidate: &str| {
+        let candidate = canonical(candidate);
+        let likeness = strsim::jaro_winkler(&name, &candidate);
+        // Short names share their letters with any long one: half of the longer must be there, or all of the shorter in a row.
+        let longer = name.chars().count().max(candidate.chars().count());
+        let meant = || 2 * strsim::osa_distance(&name, &candidate) <= longer || name.len() > 2 && candidate.contains(&name);
+        (likeness > 0.7 && meant()).then_some(likeness)
+    };
     known
         .into_iter()
-        .map(|candidate| (strsim::jaro_winkler(&name, &canonical(candidate)), candidate))
-        .filter(|(likeness, _)| *likeness > 0.7)
+        .filter_map(|candidate| Some((alike(candidate)?, candidate)))
         .max_by(|(a, _), (b, _)| a.total_cmp(b))
         .map(|(_, candidate)| candidate)
 }
@@ -73,9 +80,13 @@ mod tests {
     #[test]
     fn a_typing_error_finds_its_name() {
         let known = ["translation", "rotation", "scale", "center"];
-        for (written, expected) in
-            [("transaltion", Some("translation")), ("Rotaton", Some("rotation")), ("centre", Some("center")), ("zzz", None)]
-        {
+        for (written, expected) in [
+            ("transaltion", Some("translation")),
+            ("Rotaton", Some("rotation")),
+            ("centre", Some("center")),
+            ("zzz", None),
+            ("tan", None),
+        ] {
             assert_eq!(nearest(written, known), expected, "{written}");
         }
     }

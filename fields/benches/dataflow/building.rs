@@ -12,7 +12,7 @@ fn best(mut run: impl FnMut(&mut Graph) -> f64) -> f64 {
     (0..7).map(|_| run(&mut graph())).fold(f64::INFINITY, f64::min)
 }
 
-pub(crate) fn create(count: usize) {
+fn create(count: usize) {
     for node_type in ["Plain", "Negate", "Placed"] {
         let ns = best(|graph| {
             let start = Instant::now();
@@ -26,7 +26,7 @@ pub(crate) fn create(count: usize) {
     }
 }
 
-pub(crate) fn connect(count: usize) {
+fn connect(count: usize) {
     for backwards in [false, true] {
         let mut order = 0.0;
         let ns = best(|graph| {
@@ -47,4 +47,9 @@ pub(crate) fn connect(count: usize) {
         row(&format!("connecting a chain of {count}, {way}, per route"), ns / count as f64, None);
         row("  its first frame: order, copy lists and copies, per route", order / count as f64, None);
     }
+}
+
+pub(crate) fn all() {
+    create(100_000);
+    connect(100_000);
 }

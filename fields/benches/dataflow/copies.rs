@@ -8,7 +8,7 @@ use crate::support::{fastest, graph, nodes, row, shuffle};
 
 /// How the targets lie in memory, compared with the order of the table or of the routes.
 #[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Order {
+enum Order {
     Neighbours,
     Shuffled,
 }
@@ -99,7 +99,7 @@ fn frames(graph: &mut Graph, source: FieldId, laps: u32) -> f64 {
     ns / laps as f64
 }
 
-pub(crate) fn chain(length: usize) {
+fn chain(length: usize) {
     for order in [Order::Neighbours, Order::Shuffled] {
         let mut graph = graph();
         let fields = nodes(&mut graph, "Plain", length + 1, "x");
@@ -114,7 +114,7 @@ pub(crate) fn chain(length: usize) {
     }
 }
 
-pub(crate) fn fan_out(targets: usize, order: Order) {
+fn fan_out(targets: usize, order: Order) {
     let mut graph = graph();
     let source = nodes(&mut graph, "Plain", 1, "x")[0];
     let fields = nodes(&mut graph, "Plain", targets, "x");
@@ -135,4 +135,11 @@ pub(crate) fn fan_out(targets: usize, order: Order) {
         black_box(graph.changes_since(before));
     });
     row("  the same, and asking what changed", ns / per_target, bound);
+}
+
+pub(crate) fn all() {
+    chain(1000);
+    chain(100_000);
+    fan_out(100_000, Order::Neighbours);
+    fan_out(100_000, Order::Shuffled);
 }

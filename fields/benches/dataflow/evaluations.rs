@@ -7,7 +7,7 @@ use umbriel_fields::{FieldId, Graph, NoHost, NodeId, Strength};
 
 use crate::support::{fastest, graph, nodes, row};
 
-pub(crate) fn chain(length: usize) {
+fn chain(length: usize) {
     let mut graph = graph();
     let outputs = nodes(&mut graph, "Negate", length + 1, "y");
     for pair in outputs.windows(2) {
@@ -45,7 +45,7 @@ pub(crate) fn crowd(count: usize) -> (Graph, FieldId) {
     (graph, clock)
 }
 
-pub(crate) fn pairs(count: usize) {
+fn pairs(count: usize) {
     let (mut graph, clock) = crowd(count);
     let ns = fastest(|round| {
         graph.set(clock, (round % 97) as f32 / 97.0 + 0.001).unwrap();
@@ -56,7 +56,7 @@ pub(crate) fn pairs(count: usize) {
 }
 
 /// Each stage splits into two nodes that join again: 2^stages paths, 3 nodes a stage.
-pub(crate) fn ladder(stages: usize) {
+fn ladder(stages: usize) {
     let mut graph = graph();
     let mut joint = graph.create("Sum").unwrap();
     let first = graph.field(joint, "a").unwrap();
@@ -83,4 +83,12 @@ pub(crate) fn ladder(stages: usize) {
     });
     assert_eq!(evaluated, 3 * stages + 1, "each node once");
     row(&format!("ladder of {stages} diamonds, per node"), ns / (100 * evaluated) as f64, None);
+}
+
+pub(crate) fn all() {
+    chain(1000);
+    pairs(100_000);
+    for stages in [10, 20, 40] {
+        ladder(stages);
+    }
 }

@@ -13,13 +13,13 @@ fn at_rest(count: usize) -> (Graph, Vec<FieldId>) {
     (graph, fields)
 }
 
-pub(crate) fn nothing_changed(count: usize) {
+fn nothing_changed(count: usize) {
     let (mut graph, _) = at_rest(count);
     let ns = fastest(|_| (0..1000).for_each(|_| drop(black_box(graph.evaluate(0.0, &mut NoHost)))));
     row(&format!("{count} nodes, none changed, per frame"), ns / 1000.0, None);
 }
 
-pub(crate) fn some_changed(count: usize, changed: usize) {
+fn some_changed(count: usize, changed: usize) {
     let (mut graph, fields) = at_rest(count);
     let changed: Vec<FieldId> = fields.iter().step_by(count / changed).copied().collect();
     let ns = fastest(|round| {
@@ -29,4 +29,13 @@ pub(crate) fn some_changed(count: usize, changed: usize) {
         assert_eq!(graph.evaluate(0.0, &mut NoHost).evaluated, changed.len());
     });
     row(&format!("{count} nodes, {} set and evaluated, per changed node", changed.len()), ns / changed.len() as f64, None);
+}
+
+pub(crate) fn all() {
+    for nodes in [1000, 1_000_000] {
+        nothing_changed(nodes);
+        for changed in [1, 10, 100, 1000, 10_000].into_iter().filter(|changed| *changed <= nodes) {
+            some_changed(nodes, changed);
+        }
+    }
 }

@@ -8,32 +8,19 @@ mod memory;
 mod support;
 mod threads;
 
+/// The parts that can be measured alone: `-- idle threads`.
+const PARTS: [(&str, fn()); 6] = [
+    ("copies", copies::all),
+    ("evaluations", evaluations::all),
+    ("idle", idle::all),
+    ("building", building::all),
+    ("memory", memory::all),
+    ("threads", threads::all),
+];
+
 fn main() {
-    // `-- threads` measures those alone.
-    if std::env::args().any(|arg| arg == "threads") {
-        return threads::all();
-    }
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with('-')).collect();
+    let wants = |part: &str| wanted.is_empty() || wanted.iter().any(|wanted| wanted == part);
     println!("{:<66} {:>10} {:>9} {:>6}", "nanoseconds", "umbriel", "arrays", "ratio");
-    copies::chain(1000);
-    copies::chain(100_000);
-    copies::fan_out(100_000, copies::Order::Neighbours);
-    copies::fan_out(100_000, copies::Order::Shuffled);
-    evaluations::chain(1000);
-    evaluations::pairs(100_000);
-    for stages in [10, 20, 40] {
-        evaluations::ladder(stages);
-    }
-    for nodes in [1000, 1_000_000] {
-        idle::nothing_changed(nodes);
-        for changed in [1, 100, 1000] {
-            idle::some_changed(nodes, changed);
-        }
-    }
-    building::create(100_000);
-    building::connect(100_000);
-    println!("\n{:<66} {:>10}", "bytes", "umbriel");
-    memory::nodes(100_000);
-    memory::routes(100_000);
-    println!();
-    threads::all();
+    PARTS.iter().filter(|(part, _)| wants(part)).for_each(|(_, measure)| measure());
 }

@@ -42,7 +42,7 @@ fn in_use() -> f64 {
 }
 
 /// What grows by doubling is up to half empty; so is this figure.
-pub(crate) fn nodes_of(node_type: &str, field: &str, count: usize) -> f64 {
+fn nodes_of(node_type: &str, field: &str, count: usize) -> f64 {
     let mut graph = graph();
     graph.evaluate(0.0, &mut NoHost);
     let before = in_use();
@@ -52,7 +52,7 @@ pub(crate) fn nodes_of(node_type: &str, field: &str, count: usize) -> f64 {
     bytes / count as f64
 }
 
-pub(crate) fn nodes(count: usize) {
+fn nodes(count: usize) {
     for (node_type, field, what) in [
         ("Plain", "x", "1 field of f32"),
         ("Placed", "rotation", "vec3, quat, node[]"),
@@ -62,7 +62,7 @@ pub(crate) fn nodes(count: usize) {
     }
 }
 
-pub(crate) fn routes(count: usize) {
+fn routes(count: usize) {
     let mut graph = graph();
     let fields = support::nodes(&mut graph, "Plain", count + 1, "x");
     graph.evaluate(0.0, &mut NoHost);
@@ -73,4 +73,10 @@ pub(crate) fn routes(count: usize) {
     graph.set(fields[0], 1.0f32).unwrap();
     graph.evaluate(0.0, &mut NoHost);
     row(&format!("a route, one of {count} in a chain, with its place in the order"), (in_use() - before) / count as f64, None);
+}
+
+pub(crate) fn all() {
+    println!("\n{:<66} {:>10}", "bytes", "umbriel");
+    nodes(100_000);
+    routes(100_000);
 }

@@ -43,6 +43,7 @@ fn compare(what: &str, count: usize, (mut graph, clock): (Graph, FieldId)) {
 }
 
 pub(crate) fn all() {
+    println!();
     println!("{:<66} {:>10} {:>9} {:>6}", "nanoseconds per evaluation", "1 thread", "2 threads", "ratio");
     for count in [300, 1000, 3000, 10_000, 100_000] {
         compare("orientation interpolators of 20 keys", count, crowd(count));

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use glam::{Quat, Vec3};
+use glam::{Quat, Vec2, Vec3};
 
-use super::blend::Blend;
+use super::blend::{Blend, Normal, hermite};
 use super::keys::{Span, fault, span};
 use crate::{Color, EnumValue, Evaluation, Field, FieldValue, NodeType, SetRule, Value};
 
@@ -18,15 +18,31 @@ const STEP: EnumValue = EnumValue(1);
 const CUBIC_SPLINE: EnumValue = EnumValue(2);
 
 pub(super) fn types() -> Vec<NodeType> {
+    let same = |vertex: Vec3| vertex;
     vec![
         one::<f32>("ScalarInterpolator", "A number that follows key frames."),
+        one::<Vec2>("PositionInterpolator2D", "A place in a plane that follows key frames."),
         one::<Vec3>("PositionInterpolator", "A place or any other vector that follows key frames."),
         one::<Quat>("OrientationInterpolator", "A rotation that follows key frames, along the shorter arc."),
         one::<Color>("ColorInterpolator", "A color that follows key frames, blended as linear RGB."),
-        many::<Vec3>("CoordinateInterpolator", "Vertices that follow key frames; each key has the same number of them."),
-        many::<f32>(
+        many("CoordinateInterpolator", "Vertices that follow key frames; each key has the same number of them.", same, same),
+        many(
+            "CoordinateInterpolator2D",
+            "Points of a plane that follow key frames; each key has the same number of them.",
+            |point: Vec2| point,
+            |point| point,
+        ),
+        many(
+            "NormalInterpolator",
+            "Directions that follow key frames on the unit sphere; each key has the same number of them.",
+            Normal,
+            |normal| normal.0,
+        ),
+        many(
             "ScalarArrayInterpolator",
             "Numbers, such as morph weights, that follow key frames; each key has the same number of them.",
+            |number: f32| number,
+            |number| number,
         ),
     ]
 }
@@ -55,21 +71,28 @@ where
     Arc<[T]>: FieldValue,
 {
     declare::<T>(name, doc, T::empty().into()).evaluate(|evaluation| {
-        if let Some((span, values, mode)) = prepare::<T>(evaluation, Some(1)) {
-            evaluation.set(VALUE_CHANGED, sample(&values, 1, 0, mode, span));
+        let value = prepare::<T>(evaluation, Some(1)).map(|ready| sample(|at| ready.values[at], 1, 0, ready.mode, ready.span));
+        if let Some(value) = value {
+            evaluation.set(VALUE_CHANGED, value);
         }
     })
 }
 
-fn many<T: FieldValue + Blend>(name: &str, doc: &str) -> NodeType
+/// Items that are blended as something else.
+fn many<T, B>(name: &str, doc: &str, blended: fn(T) -> B, plain: fn(B) -> T) -> NodeType
 where
+    T: FieldValue + Copy,
+    B: Blend + 'static,
     Arc<[T]>: FieldValue,
 {
-    declare::<T>(name, doc, <Arc<[T]>>::empty().into()).evaluate(|evaluation| {
-        if let Some((span, values, mode)) = prepare::<T>(evaluation, None) {
-            let per_key = values.len() / (evaluation.get::<Arc<[f32]>>(KEY).len() * stride(mode));
-            let blended: Arc<[T]> = (0..per_key).map(|item| sample(&values, per_key, item, mode, span)).collect();
-            evaluation.set(VALUE_CHANGED, blended);
+    declare::<T>(name, doc, <Arc<[T]>>::empty().into()).evaluate(move |evaluation| {
+        let list = prepare::<T>(evaluation, None).map(|Ready { values, keys, mode, span }| {
+            let per_key = values.len() / (keys * stride(mode));
+            let at = |item| plain(sample(|at| blended(values[at]), per_key, item, mode, span));
+            (0..per_key).map(at).collect::<Arc<[T]>>()
+        });
+        if let Some(list) = list {
+            evaluation.set(VALUE_CHANGED, list);
         }
     })
 }
@@ -79,47 +102,52 @@ fn stride(mode: EnumValue) -> usize {
     if mode == CUBIC_SPLINE { 3 } else { 1 }
 }
 
+/// What there is to compute from.
+struct Ready<'a, T> {
+    values: &'a [T],
+    /// How many keys there are.
+    keys: usize,
+    mode: EnumValue,
+    span: Span,
+}
+
 /// Where the fraction lies, if there is anything to compute. Bad keys are reported when they were written, and not used.
-fn prepare<T>(evaluation: &mut Evaluation<'_>, per_key: Option<usize>) -> Option<(Span, Arc<[T]>, EnumValue)>
+fn prepare<'a, T>(evaluation: &'a mut Evaluation<'_>, per_key: Option<usize>) -> Option<Ready<'a, T>>
 where
     Arc<[T]>: FieldValue,
 {
-    let keys: Arc<[f32]> = evaluation.get(KEY);
-    let values: Arc<[T]> = evaluation.get(KEY_VALUE);
     let mode: EnumValue = evaluation.get(INTERPOLATION);
     let new_keys = evaluation.changed(KEY) || evaluation.changed(KEY_VALUE) || evaluation.changed(INTERPOLATION);
-    if new_keys && let Some(fault) = fault(&keys, values.len(), per_key, stride(mode)) {
-        evaluation.report_field(KEY, fault);
+    if new_keys {
+        let values = evaluation.read::<Arc<[T]>>(KEY_VALUE)?.len();
+        let fault = fault(evaluation.read::<Arc<[f32]>>(KEY)?, values, per_key, stride(mode));
+        fault.into_iter().for_each(|fault| evaluation.report_field(KEY, fault));
     }
     // Without any fraction the value stays: what follows this node keeps its own place until the clock starts.
     if !evaluation.written(SET_FRACTION) || !(new_keys || evaluation.changed(SET_FRACTION)) {
         return None;
     }
+    let fraction: f32 = evaluation.get(SET_FRACTION);
+    let (keys, values) = (evaluation.read::<Arc<[f32]>>(KEY)?, evaluation.read::<Arc<[T]>>(KEY_VALUE)?);
     let group = keys.len() * stride(mode);
     let fits = group > 0
         && !values.is_empty()
         && values.len().is_multiple_of(group)
         && per_key.is_none_or(|per_key| values.len() == group * per_key);
-    let span = span(&keys, evaluation.get(SET_FRACTION))?;
-    fits.then_some((span, values, mode))
+    let span = span(keys, fraction)?;
+    fits.then_some(Ready { values, keys: keys.len(), mode, span })
 }
 
 /// One item of the values at a place between keys.
-fn sample<T: Blend>(values: &[T], per_key: usize, item: usize, mode: EnumValue, span: Span) -> T {
+fn sample<T: Blend>(value: impl Fn(usize) -> T, per_key: usize, item: usize, mode: EnumValue, span: Span) -> T {
     if mode == CUBIC_SPLINE {
-        let at = |key: usize, part: usize| values[(3 * key + part) * per_key + item];
+        let at = |key: usize, part: usize| value((3 * key + part) * per_key + item);
         if span.from == span.to {
             return at(span.from, 1);
         }
-        let (t, t2, t3) = (span.share, span.share * span.share, span.share * span.share * span.share);
-        return T::weigh([
-            (at(span.from, 1), 2.0 * t3 - 3.0 * t2 + 1.0),
-            (at(span.from, 2), span.length * (t3 - 2.0 * t2 + t)),
-            (at(span.to, 1), -2.0 * t3 + 3.0 * t2),
-            (at(span.to, 0), span.length * (t3 - t2)),
-        ]);
+        return hermite([at(span.from, 1), at(span.from, 2), at(span.to, 1), at(span.to, 0)], span.share, span.length);
     }
-    let at = |key: usize| values[key * per_key + item];
+    let at = |key: usize| value(key * per_key + item);
     if span.from == span.to {
         at(span.from)
     } else if mode == STEP {

@@ -1,6 +1,6 @@
 //! Arithmetic and logic of any number of inputs: two are declared, and every field that is added to the node is another.
 
-use crate::{Evaluation, Field, FieldValue, NodeType};
+use crate::{Field, FieldValue, NodeType};
 
 const VALUE: u16 = 2;
 
@@ -22,16 +22,14 @@ fn fold<T: FieldValue>(name: &str, doc: &str, join: impl Fn(T, T) -> T + Send + 
         .field(Field::new("b", T::empty()).doc("An input."))
         .field(Field::new("value", T::empty()).output().doc("The result."))
         .evaluate(move |evaluation| {
-            let result = inputs::<T>(evaluation).into_iter().reduce(&join);
-            if let Some(result) = result {
-                evaluation.set(VALUE, result);
+            let mut result = join(evaluation.get(0), evaluation.get(1));
+            for added in VALUE + 1..evaluation.places() {
+                if evaluation.has(added) {
+                    result = join(result, evaluation.get(added));
+                }
             }
+            evaluation.set(VALUE, result);
         })
-}
-
-fn inputs<T: FieldValue>(evaluation: &mut Evaluation<'_>) -> Vec<T> {
-    let places: Vec<u16> = evaluation.fields().map(|(index, _)| index).filter(|index| *index != VALUE).collect();
-    places.into_iter().map(|index| evaluation.get(index)).collect()
 }
 
 fn not() -> NodeType {

@@ -7,7 +7,22 @@ fn event(name: &str, default: impl Into<Value>, doc: &str) -> Field {
 }
 
 pub(super) fn types() -> Vec<NodeType> {
-    vec![boolean_trigger(), boolean_toggle(), integer_trigger(), time_trigger(), edge_trigger()]
+    vec![boolean_filter(), boolean_trigger(), boolean_toggle(), integer_trigger(), time_trigger(), edge_trigger()]
+}
+
+fn boolean_filter() -> NodeType {
+    NodeType::new("BooleanFilter", "Tells true and false apart.")
+        .field(event("set_boolean", false, "The event."))
+        .field(event("input_true", false, "True, written for each true.").output())
+        .field(event("input_false", false, "False, written for each false.").output())
+        .field(event("input_negate", true, "The opposite, written for each event.").output())
+        .evaluate(|evaluation| {
+            if evaluation.changed(0) {
+                let event: bool = evaluation.get(0);
+                evaluation.set(if event { 1 } else { 2 }, event);
+                evaluation.set(3, !event);
+            }
+        })
 }
 
 fn boolean_trigger() -> NodeType {
