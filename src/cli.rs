@@ -52,6 +52,11 @@ pub(crate) enum Command {
     /// Evaluates a world and publishes its frames to displays in other processes
     #[cfg(feature = "cluster")]
     Serve(Serve),
+    /// Runs a script in a world that another process serves
+    ///
+    /// The script sees the nodes of all, owns what it makes, and may write others' nodes once a lock was granted. Ctrl-C ends it.
+    #[cfg(feature = "cluster")]
+    Join(Join),
     /// Shows displays of a world that another process serves, frame by frame together with all others
     ///
     /// Comes back by itself after a break of the line or a restart of the application.
@@ -279,6 +284,40 @@ pub(crate) struct Serve {
     /// How long a frame waits for a display, in milliseconds
     #[arg(long, default_value_t = 200)]
     pub(crate) timeout_ms: u64,
+}
+
+#[cfg(feature = "cluster")]
+#[derive(Args, Debug)]
+pub(crate) struct Join {
+    /// A script (.rhai)
+    pub(crate) path: PathBuf,
+    /// Where the application listens that evaluates the world
+    #[arg(long, default_value = "tcp/127.0.0.1:7447")]
+    pub(crate) connect: String,
+    #[command(flatten)]
+    pub(crate) link: Link,
+    /// What the others call this application; otherwise the name of the script's file
+    #[arg(long)]
+    pub(crate) name: Option<String>,
+    /// What becomes of its nodes when it ends; the script can say so too, with on_leave
+    #[arg(long, value_enum, default_value_t = OnLeave::Remove)]
+    pub(crate) on_leave: OnLeave,
+    /// End after so many frames
+    #[arg(long)]
+    pub(crate) frames: Option<u64>,
+    /// End when the other application ends, instead of waiting for it to come back
+    #[arg(long)]
+    pub(crate) once: bool,
+}
+
+/// What becomes of the nodes of an application that ends.
+#[cfg(feature = "cluster")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OnLeave {
+    /// They go to the application that evaluates the world
+    Keep,
+    /// They are taken out of the world
+    Remove,
 }
 
 #[cfg(feature = "cluster")]

@@ -35,7 +35,7 @@ fn main() -> ExitCode {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env();
     tracing_subscriber::fmt()
         .with_env_filter(filter.unwrap_or_else(|_| {
-            "warn,umbriel_scripts=info,umbriel_displays=info,zenoh=error,wgpu_hal=error,wgpu_core=error,naga=error".into()
+            "warn,umbriel::script=info,umbriel::cluster=info,umbriel_scripts=info,umbriel_displays=info,zenoh=error,wgpu_hal=error,wgpu_core=error,naga=error".into()
         }))
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
@@ -55,6 +55,8 @@ fn main() -> ExitCode {
         }
         #[cfg(feature = "cluster")]
         Command::Serve(args) => cluster::serve(args),
+        #[cfg(feature = "cluster")]
+        Command::Join(args) => cluster::join(args),
         #[cfg(feature = "cluster")]
         Command::Display(args) => cluster::display(args),
         #[cfg(feature = "cluster")]

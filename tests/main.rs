@@ -1,5 +1,7 @@
 //! Tests of the whole: what the command does, and who may depend on whom. One binary, one module per subject.
 
+#[cfg(feature = "cluster")]
+mod applications;
 mod command;
 mod layers;
 mod recording;

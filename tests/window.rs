@@ -1,7 +1,8 @@
 //! The command in a window on a virtual screen: it shows the world, a drag orbits, a saved script is read again.
 #![cfg(target_os = "linux")]
 
-use crate::support::screen::{Screen, until};
+use crate::support::screen::Screen;
+use crate::support::until;
 use image::RgbImage;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};

@@ -6,7 +6,7 @@ use crate::graph::slot_of;
 use crate::propagate::Carried;
 use crate::record::Event;
 use crate::schedule::{EVALUATES, IN_TURN, NATIVE, OBSERVED, ROUTED, SILENCED};
-use crate::{Error, FieldId, Graph, Mode, NodeId, Strength};
+use crate::{Changes, Error, Evaluator, FieldId, Graph, Mode, NodeId, Revision, Strength};
 
 /// What the graph asks for while a frame is evaluated. Everything is allowed in these calls but to evaluate the graph: what is created,
 /// connected or written for nodes that had their turn takes part from the next frame on.
@@ -94,6 +94,21 @@ impl Graph {
         self.frame.dependencies.clear();
         self.note(|| Event::Leave);
         std::mem::take(&mut self.frame.report)
+    }
+
+    /// Tells observers of what was written after a revision, and has the host evaluate its nodes of those. Nothing goes along routes and no
+    /// native node is evaluated: for a copy of a graph that another process evaluates.
+    pub fn tell(&mut self, since: Revision, host: &mut dyn Host) {
+        let nodes = match self.changes_since(since) {
+            Changes::Nodes(nodes) => nodes,
+            Changes::All => self.nodes.keys().collect(),
+        };
+        for id in nodes {
+            let is_there = self.contains(id) && self.tell_observers(id, host);
+            if is_there && matches!(self.nodes[id].node_type.evaluator, Evaluator::Host) {
+                host.evaluate(self, id);
+            }
+        }
     }
 
     fn run_frame(&mut self, host: &mut dyn Host) {

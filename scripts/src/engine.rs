@@ -162,6 +162,7 @@ impl Drop for Script {
         on_deep_stack(|| {
             self.stage.on_frame.borrow_mut().clear();
             self.stage.on_change.borrow_mut().clear();
+            self.stage.awaited.borrow_mut().clear();
             self.stage.definitions.borrow_mut().clear();
             self.stage.compiled.borrow_mut().clear();
             self.stage.running_constants.borrow_mut().clear();

@@ -14,6 +14,7 @@ use crate::error::{Fault, Outcome, Problem, fail};
 use crate::expression::Compiled;
 use crate::limits::{Limits, Meter};
 use crate::property_names::PropertyNames;
+use crate::sharing::Sharing;
 use crate::source::Source;
 use crate::values::{to_dynamic, to_value};
 use crate::words::declare::declared;
@@ -63,6 +64,10 @@ pub(crate) struct Stage {
     pub(crate) behaviours: RefCell<HashMap<NodeId, Behaviour>>,
     /// Those of them that are evaluated in every frame, in the order in which they were made.
     pub(crate) always: RefCell<Vec<NodeId>>,
+    /// Whose nodes are whose, where several applications work on the world.
+    pub(crate) sharing: RefCell<Option<Sharing>>,
+    /// Who waits for the answer about a lock.
+    pub(crate) awaited: RefCell<Vec<(Node, Handler)>>,
     /// The nodes whose `evaluate` runs, with the type that it stands in, for `evaluate_base`.
     pub(crate) evaluating: RefCell<Vec<(Node, String)>>,
     /// Texts of Expressions, compiled.
@@ -107,6 +112,8 @@ impl Stage {
             definitions: RefCell::default(),
             behaviours: RefCell::default(),
             always: RefCell::default(),
+            sharing: RefCell::default(),
+            awaited: RefCell::default(),
             evaluating: RefCell::default(),
             compiled: RefCell::default(),
             functions: RefCell::new(AST::empty()),
@@ -197,6 +204,7 @@ impl Stage {
 
     pub(crate) fn delete(&self, node: Node) -> Outcome<()> {
         self.may_change()?;
+        self.may_write(node, "", None)?;
         let label = self.label(node);
         self.write(|graph| graph.delete(node.0)).map_err(|e| self.fault(e, &label, None))?;
         self.on_change.borrow_mut().retain(|_, handler| handler.field.node != node.0);
@@ -259,6 +267,7 @@ impl Stage {
                 self.fault_at(node, name, format!("field `{name}` of {label}: {why}"))
             })?,
         };
+        self.may_write(node, name, Some((field, &value)))?;
         self.reserve(field, &value)?;
         let written = self.write(|graph| graph.set_value(field, value));
         written.map_err(|e| self.fault(e, &self.label(node), Some(name)).into())
@@ -289,6 +298,7 @@ impl Stage {
 
     pub(crate) fn add_field(&self, node: Node, name: &str, default: &Dynamic) -> Outcome<()> {
         self.may_change()?;
+        self.may_write(node, name, None)?;
         let field = declared(name, default).map_err(|why| self.fault_at(node, name, format!("field `{name}`: {why}")))?;
         let added = self.write(|graph| graph.add_field(node.0, field));
         added.map(drop).map_err(|e| self.fault(e, &self.label(node), Some(name)).into())

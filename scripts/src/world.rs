@@ -1,11 +1,12 @@
 //! A world: the graph, and the script that made it and that it calls.
 
+use std::cell::RefMut;
 use std::collections::{BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use rhai::Dynamic;
-use umbriel_fields::{FieldId, FrameReport, Graph, Host, NodeId};
+use umbriel_fields::{FieldId, FrameReport, Graph, Host, NodeId, Revision};
 use umbriel_scenegraph::new_graph;
 
 use crate::definition::BEHAVIOUR;
@@ -14,6 +15,7 @@ use crate::error::{Problem, ScriptError};
 use crate::expression::{self, EXPRESSION};
 use crate::held;
 use crate::limits::Limits;
+use crate::sharing::Sharing;
 use crate::source::Source;
 use crate::stage::{Node, Stage};
 
@@ -38,6 +40,8 @@ pub struct World {
     generation: u64,
     /// What nodes reported already.
     told: HashSet<(NodeId, String)>,
+    /// Writes up to this one were told to the script, where another process evaluates the world.
+    told_until: Revision,
 }
 
 impl World {
@@ -57,6 +61,17 @@ impl World {
         let path = path.as_ref();
         let (graph, script) = load(path, &settings)?;
         Ok(Self::of(graph, script, settings, Some(path.to_path_buf())))
+    }
+
+    /// Runs a world's file in a graph that holds nodes of other applications; see [`shared_graph`].
+    pub fn join_file(path: impl AsRef<Path>, mut graph: Graph, sharing: Sharing) -> Result<Self, ScriptError> {
+        let (path, settings) = (path.as_ref(), Settings::default());
+        let source = Source::read(path, settings.limits.text)?;
+        let world = graph.find(umbriel_scenegraph::WORLD).map(Node);
+        let mut script = Script::new(Stage::new(settings.limits.clone(), folder_of(path).into_iter().collect()), world);
+        *script.stage.sharing.borrow_mut() = Some(sharing);
+        run(&mut graph, &mut script, source)?;
+        Ok(Self::of(graph, script, settings, None))
     }
 
     /// Runs a text as a world; the name stands in its messages.
@@ -84,6 +99,7 @@ impl World {
             time_s: None,
             generation: 0,
             told: HashSet::new(),
+            told_until: 0,
         };
         world.collect();
         world
@@ -109,6 +125,7 @@ impl World {
         let mut report = on_deep_stack(|| {
             self.script.stage.time_s.set(time_s);
             self.script.stage.frame.set(self.script.stage.frame.get() + 1);
+            grant_all(&mut self.graph, &self.script);
             call_on_frame(&mut self.graph, &self.script, time_s, time_s - last);
             self.graph.set_origin("");
             self.script.stage.wake_always(&mut self.graph, time_s);
@@ -119,6 +136,33 @@ impl World {
         self.collect();
         self.take_over(std::mem::take(&mut report.problems));
         report
+    }
+
+    /// Runs one frame of a world that another process evaluates: the script's handlers, and the node types that it defines.
+    pub fn step_shared(&mut self, time_s: f64) {
+        let last = self.time_s.replace(time_s).unwrap_or(time_s);
+        on_deep_stack(|| {
+            let stage = &self.script.stage;
+            stage.time_s.set(time_s);
+            stage.frame.set(stage.frame.get() + 1);
+            call_on_frame(&mut self.graph, &self.script, time_s, time_s - last);
+            stage.wake_always(&mut self.graph, time_s);
+            let since = std::mem::replace(&mut self.told_until, self.graph.revision());
+            self.graph.tell(since, &mut Callbacks { script: &self.script, time_s });
+            held::bound(stage);
+        });
+        self.collect();
+    }
+
+    /// What the script knows of other applications; none where it is alone.
+    pub fn sharing_mut(&self) -> Option<RefMut<'_, Sharing>> {
+        RefMut::filter_map(self.script.stage.sharing.borrow_mut(), Option::as_mut).ok()
+    }
+
+    /// The answer about a lock that the script asked for; an error says why it is refused.
+    pub fn answer(&mut self, node: NodeId, answer: &Result<(), String>) {
+        on_deep_stack(|| tell_lock(&mut self.graph, &self.script, Some(node), answer));
+        self.collect();
     }
 
     /// Runs a text in the running world, as typed at a console, and gives the value as text. Top-level variables of the
@@ -219,11 +263,14 @@ fn problem_of(error: ScriptError, path: &Path) -> Problem {
 
 fn load(path: &Path, settings: &Settings) -> Result<(Graph, Script), ScriptError> {
     let source = Source::read(path, settings.limits.text)?;
-    // The parent of a bare file name is empty, which no system call takes for the current folder.
-    let folder = path.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
-    let (mut graph, mut script) = empty(settings, folder);
+    let (mut graph, mut script) = empty(settings, folder_of(path).as_deref());
     run(&mut graph, &mut script, source)?;
     Ok((graph, script))
+}
+
+/// The parent of a bare file name is empty, which no system call takes for the current folder.
+fn folder_of(path: &Path) -> Option<PathBuf> {
+    path.parent().map(|p| if p.as_os_str().is_empty() { PathBuf::from(".") } else { p.to_path_buf() })
 }
 
 fn empty(settings: &Settings, folder: Option<&Path>) -> (Graph, Script) {
@@ -240,6 +287,35 @@ pub(crate) fn empty_graph() -> Graph {
         tracing::error!("{error}");
     }
     graph
+}
+
+/// A graph for [`World::join_file`]: it knows all node types of worlds, and holds the Group `world`.
+pub fn shared_graph() -> Graph {
+    empty_graph()
+}
+
+/// Nobody else is there to have locked anything.
+fn grant_all(graph: &mut Graph, script: &Script) {
+    if !script.stage.awaited.borrow().is_empty() {
+        tell_lock(graph, script, None, &Ok(()));
+    }
+}
+
+/// Calls the handlers that wait for the answer about a node, or about all.
+fn tell_lock(graph: &mut Graph, script: &Script, node: Option<NodeId>, answer: &Result<(), String>) {
+    let stage = &script.stage;
+    let awaited = std::mem::take(&mut *stage.awaited.borrow_mut());
+    let (due, rest): (Vec<_>, Vec<_>) = awaited.into_iter().partition(|(of, _)| node.is_none_or(|node| node == of.0));
+    *stage.awaited.borrow_mut() = rest;
+    for (of, handler) in due {
+        stage.with(graph, || {
+            let why = answer.as_ref().err().cloned().unwrap_or_default();
+            if let Err(mut problem) = script.call(&handler, vec![answer.is_ok().into(), why.into()]) {
+                problem.node = problem.node.or_else(|| Some(stage.label(of)));
+                stage.problems.borrow_mut().push(problem);
+            }
+        });
+    }
 }
 
 fn run(graph: &mut Graph, script: &mut Script, source: Source) -> Result<(), Problem> {
@@ -294,11 +370,15 @@ impl Host for Callbacks<'_> {
 
     fn evaluate(&mut self, graph: &mut Graph, node: NodeId) {
         let stage = &self.script.stage;
-        if !graph.contains(node) || stage.switched_off.borrow().contains(&node) {
+        if !graph.contains(node) || stage.switched_off.borrow().contains(&node) || !stage.evaluates(node) {
             return;
         }
         let type_name = graph.type_of(node).name.clone();
         if &*type_name == EXPRESSION {
+            // It is evaluated where the world is.
+            if stage.sharing.borrow().is_some() {
+                return;
+            }
             return expression::evaluate(self.script, graph, node);
         }
         self.run_evaluate(graph, node, &type_name);

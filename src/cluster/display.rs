@@ -21,9 +21,7 @@ pub(crate) fn display(args: &cli::Display) -> Result<usize, Failure> {
     while !follower.is_over() {
         follower.run(&mut canvas, Duration::from_millis(50)).inspect_err(|_| println!("{}", summary(&follower)))?;
         if args.once && !follower.found_application() && started.elapsed() > Duration::from_secs(PATIENCE_S) {
-            let hint = if args.link.certificates.is_some() { ", or it does not accept the certificate" } else { "" };
-            let (endpoint, seconds) = (args.connect.clone(), PATIENCE_S);
-            return Err(ClusterError::NoApplication { endpoint, seconds, hint }.into());
+            return Err(ClusterError::silent(&args.connect, PATIENCE_S, args.link.certificates.is_some()).into());
         }
         if corrupt_after.is_some_and(|frame| corrupt(&mut follower, frame)) {
             corrupt_after = None;

@@ -2,11 +2,14 @@
 
 mod display;
 mod harness;
+mod interrupt;
+mod join;
 mod screen;
 mod serve;
 
 pub(crate) use display::display;
 pub(crate) use harness::run;
+pub(crate) use join::join;
 pub(crate) use serve::serve;
 
 use crate::cli;

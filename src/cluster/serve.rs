@@ -1,10 +1,11 @@
 //! The application: evaluates a world and publishes its frames.
 
+use super::interrupt::Interrupt;
 use super::{Failure, security};
 use crate::cli;
 use crate::session::Session;
 use std::time::{Duration, Instant};
-use umbriel_displays::cluster::{Host, HostOptions, Input};
+use umbriel_displays::cluster::{Desk, Host, HostOptions, Input};
 use umbriel_fields::{Graph, Value};
 
 /// Serves until the last frame, or for ever.
@@ -16,14 +17,17 @@ pub(crate) fn serve(args: &cli::Serve) -> Result<usize, Failure> {
         timeout: Duration::from_millis(args.timeout_ms),
     };
     let mut host = Host::listen(&options)?;
+    let mut desk = Desk::open(&host, &session.name())?;
+    let interrupt = Interrupt::watch()?;
     println!("{} is served at {}", session.name(), args.listen);
     let mut problems = begin(&mut session, &mut host, args.wait_for, &mut || Ok(()))?;
     let (started, mut frame) = (Instant::now(), 1u64);
-    while args.frames.is_none_or(|frames| frame < frames) {
+    while args.frames.is_none_or(|frames| frame < frames) && !interrupt.came() {
         let next = started + Duration::from_secs_f64(frame as f64 / args.fps);
         host.wait_until(session.graph(), next);
         frame += 1;
-        problems += step(&mut session, &mut host, started.elapsed().as_secs_f64(), args.frames == Some(frame));
+        let is_last = args.frames == Some(frame) || interrupt.came();
+        problems += step_with(&mut session, &mut host, Some(&mut desk), started.elapsed().as_secs_f64(), is_last);
     }
     println!("{}", summary(&host));
     Ok(problems)
@@ -46,6 +50,11 @@ pub(super) fn begin(
 
 /// One frame; gives the number of problems.
 pub(super) fn step(session: &mut Session, host: &mut Host, time_s: f64, is_last: bool) -> usize {
+    step_with(session, host, None, time_s, is_last)
+}
+
+/// One frame of a world that others work on as well.
+fn step_with(session: &mut Session, host: &mut Host, mut desk: Option<&mut Desk>, time_s: f64, is_last: bool) -> usize {
     let mut told = 0;
     for input in host.inputs() {
         if let Err(reason) = apply(session.graph_mut(), &input) {
@@ -53,8 +62,17 @@ pub(super) fn step(session: &mut Session, host: &mut Host, time_s: f64, is_last:
             told += 1;
         }
     }
+    if let Some(desk) = &mut desk {
+        desk.begin(session.graph_mut());
+    }
     session.evaluate(time_s);
+    if let Some(desk) = &mut desk {
+        desk.publish(host, session.graph());
+    }
     host.frame(session.graph(), is_last);
+    if let Some(desk) = desk {
+        desk.welcome(host, session.graph());
+    }
     for problem in session.problems() {
         tracing::error!("{problem}");
         told += 1;

@@ -5,6 +5,7 @@ pub(crate) mod screen;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// The root of the repository.
 pub(crate) fn root() -> &'static Path {
@@ -46,5 +47,17 @@ pub(crate) fn umbriel(args: &[&str]) -> Run {
         ok: output.status.success(),
         stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
         stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+    }
+}
+
+/// Tries again and again until something is found or patience ends.
+pub(crate) fn until<T>(patience: Duration, mut look: impl FnMut() -> Option<T>) -> Option<T> {
+    let started = Instant::now();
+    loop {
+        let found = look();
+        if found.is_some() || started.elapsed() > patience {
+            return found;
+        }
+        std::thread::sleep(Duration::from_millis(100));
     }
 }

@@ -1,8 +1,9 @@
 //! A virtual X screen: started for one test, looked at, and given mouse and keys.
 
+use super::until;
 use image::RgbImage;
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{self, AtomEnum, ConnectionExt as _, ImageFormat, MapState, Window};
 use x11rb::protocol::xtest::ConnectionExt as _;
@@ -93,17 +94,5 @@ impl Drop for Screen {
     fn drop(&mut self) {
         let _ = self.server.kill();
         let _ = self.server.wait();
-    }
-}
-
-/// Tries again and again until something is found or patience ends.
-pub(crate) fn until<T>(patience: Duration, mut look: impl FnMut() -> Option<T>) -> Option<T> {
-    let started = Instant::now();
-    loop {
-        let found = look();
-        if found.is_some() || started.elapsed() > patience {
-            return found;
-        }
-        std::thread::sleep(Duration::from_millis(100));
     }
 }

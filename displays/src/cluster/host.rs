@@ -98,7 +98,7 @@ pub struct Host {
     is_last: bool,
     report: HostReport,
     _held: (Vec<Subscriber<()>>, Vec<Queryable<()>>, LivelinessToken),
-    _session: Session,
+    session: Session,
 }
 
 fn network(error: zenoh::Error) -> ClusterError {
@@ -174,8 +174,23 @@ impl Host {
             is_last: false,
             report: HostReport::default(),
             _held: (subscribers, queryables, token),
-            _session: session,
+            session,
         })
+    }
+
+    /// For others of this end.
+    pub(super) fn session(&self) -> &Session {
+        &self.session
+    }
+
+    /// This run.
+    pub(super) fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// The number of the last frame that was published.
+    pub fn last_frame(&self) -> u64 {
+        self.publisher.last_frame()
     }
 
     /// Names of displays that frames wait for.
@@ -332,7 +347,7 @@ impl Host {
     }
 
     /// As of the last frame; made once per frame.
-    fn snapshot(&mut self, graph: &Graph) -> Option<Arc<[u8]>> {
+    pub(super) fn snapshot(&mut self, graph: &Graph) -> Option<Arc<[u8]>> {
         let frame = self.publisher.last_frame();
         if let Some((of, bytes)) = &self.snapshot
             && *of == frame

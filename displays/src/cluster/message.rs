@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use umbriel_fields::replica::Deed;
+
 use super::transport::ClusterError;
 
 /// Spoken by both ends; another one is refused.
@@ -17,6 +19,63 @@ pub(super) const BULK: &str = "umbriel/bulk";
 pub(super) const APPLICATION: &str = "umbriel/application";
 /// Alive while a display is; its number follows.
 pub(super) const DISPLAY: &str = "umbriel/display";
+
+/// A guest asks for everything, for itself and the world.
+pub(super) const GUEST_SNAPSHOT: &str = "umbriel/guests/snapshot";
+/// What guests did.
+pub(super) const DEEDS: &str = "umbriel/guests/deeds";
+/// What became of it.
+pub(super) const WORD: &str = "umbriel/guests/word";
+/// Alive while a guest is; its number follows.
+pub(super) const GUEST: &str = "umbriel/guest";
+
+/// A guest asks to be let in, or asks again after a gap.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct GuestJoin {
+    pub(super) protocol: u16,
+    pub(super) guest: u64,
+    pub(super) name: String,
+    pub(super) keeps: bool,
+}
+
+/// What a guest did in a frame of its own.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct GuestMessage {
+    pub(super) guest: u64,
+    /// Counts from one.
+    pub(super) number: u64,
+    pub(super) deeds: Vec<Deed>,
+    pub(super) images: Vec<(u64, Vec<u8>)>,
+    pub(super) requests: Vec<GuestRequest>,
+}
+
+/// What a guest asks for, after what it did.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) enum GuestRequest {
+    Lock(u64),
+    Unlock(u64),
+    Keeps(bool),
+    Leave,
+}
+
+/// What guests learn with a frame; all of it in the answer to who joins.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Word {
+    pub(super) epoch: u64,
+    pub(super) frame: u64,
+    /// The name of the application that evaluates.
+    pub(super) host: String,
+    /// Who is there, and the last message that was done of each.
+    pub(super) guests: Vec<(u64, String, u64)>,
+    /// Guest, its own key of a node, and the node's number.
+    pub(super) made: Vec<(u64, u32, u64)>,
+    /// Owner and holder of a lock of nodes.
+    pub(super) whose: Vec<(u64, Option<u64>, Option<u64>)>,
+    /// Guest, and what was not done for it.
+    pub(super) refused: Vec<(u64, String)>,
+    /// Guest, node, and whether it has the lock.
+    pub(super) answers: Vec<(u64, u64, Result<(), String>)>,
+}
 
 /// The application lets a frame be shown.
 #[derive(Debug, Serialize, Deserialize)]

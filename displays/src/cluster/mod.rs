@@ -4,6 +4,7 @@
 //! ready, and show on release. The frame lock ([`lock`]) is two state machines without sockets or clocks; the rest of this module moves
 //! their messages, on zenoh, and exists with the cargo feature `cluster`.
 
+pub mod guests;
 pub mod lock;
 
 #[cfg(feature = "cluster")]
@@ -28,3 +29,5 @@ pub use self::{
     proxy::Proxy,
     transport::{ClusterError, Security},
 };
+#[cfg(feature = "cluster")]
+pub use guests::{Desk, Guest, News, Whose, Wish};

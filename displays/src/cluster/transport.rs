@@ -47,6 +47,9 @@ pub enum ClusterError {
     /// The application does not want this display.
     #[error("the application refuses this display: {0}")]
     Refused(String),
+    /// The host does not want this guest.
+    #[error("the host refuses this application: {0}")]
+    GuestRefused(String),
     /// The packets do not fit.
     #[error(transparent)]
     Replica(#[from] umbriel_fields::replica::ReplicaError),
@@ -63,6 +66,14 @@ pub enum ClusterError {
     /// A certificate could not be made.
     #[error("cannot make a certificate: {0}")]
     Make(String),
+}
+
+impl ClusterError {
+    /// Nothing answered for so long.
+    pub fn silent(endpoint: &str, seconds: u64, has_certificates: bool) -> ClusterError {
+        let hint = if has_certificates { ", or it does not accept the certificate" } else { "" };
+        ClusterError::NoApplication { endpoint: endpoint.into(), seconds, hint }
+    }
 }
 
 /// How links are protected.

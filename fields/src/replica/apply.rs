@@ -342,7 +342,7 @@ impl Replica {
 }
 
 /// Writes a value that was right where it came from.
-fn put(graph: &mut Graph, field: FieldId, value: Value) -> Result<(), ReplicaError> {
+pub(super) fn put(graph: &mut Graph, field: FieldId, value: Value) -> Result<(), ReplicaError> {
     let (declared, slot) = graph.place(field).map_err(|error| damaged(error.to_string()))?;
     if declared.field_type != value.field_type() {
         return Err(damaged(format!("{} does not hold a {}", graph.describe_field(field), value.field_type())));

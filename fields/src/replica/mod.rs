@@ -8,13 +8,17 @@
 //! Types and fields go by name: a replica may know them in another order, and need not know a type at all. Long lists and images go by a
 //! hash of their content, once ([`Publisher::bulk`], [`Packet::missing`]). What is declared `local` stays with its process.
 //!
+//! Who wants to change a world that another process evaluates works on a copy ([`Mirror`]), and tells what it did ([`Deed`]).
+//!
 //! How packets travel is not known here.
 
 mod apply;
 mod bulk;
+mod deeds;
 mod difference;
 mod learn;
 mod local;
+mod mirror;
 mod packet;
 mod publisher;
 mod routes;
@@ -22,7 +26,9 @@ mod shares;
 
 pub use apply::Replica;
 pub use bulk::Bulk;
+pub use deeds::{Deed, node_numbered, number_of, own_key};
 pub use difference::Difference;
+pub use mirror::{Deeds, Mirror};
 pub use packet::Packet;
 pub use publisher::Publisher;
 

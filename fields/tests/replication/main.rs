@@ -5,5 +5,6 @@ mod dice;
 #[path = "../persistence/support.rs"]
 mod support;
 
+mod guests;
 mod packets;
 mod random_worlds;

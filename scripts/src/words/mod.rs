@@ -11,6 +11,7 @@ mod paper;
 mod rigs;
 mod routes;
 mod shapes;
+mod sharing;
 mod types;
 mod vectors;
 
@@ -76,6 +77,7 @@ pub(crate) fn teach(engine: &mut Engine, stage: &Rc<Stage>) -> Vec<FunctionDoc> 
     handlers::teach(words.chapter("Handlers"));
     explain::teach(words.chapter("Explanations"));
     shapes::teach(words.chapter("Shapes and groups"));
+    sharing::teach(words.chapter("Worlds of several applications"));
     models::teach(words.chapter("Models"));
     types::teach(words.chapter("Node types of your own"));
     declare::teach(&mut words);

@@ -96,6 +96,7 @@ fn fields(words: &mut Words<'_>) {
     );
     let stage = words.stage.clone();
     words.word("remove_field(node: Node, name: string)", "Takes such a field away again.", move |node: Node, name: &str| {
+        stage.may_write(node, name, None)?;
         let field = stage.field(node, name)?;
         let removed = stage.write(|graph| graph.remove_field(field));
         removed.map_err(|e| stage.fault_at(node, name, e.to_string()).into()) as Outcome<()>
@@ -105,6 +106,7 @@ fn fields(words: &mut Words<'_>) {
         "touch(node: Node, field: string)",
         "Says that a field changed although its value did not.",
         move |node: Node, name: &str| {
+            stage.may_write(node, name, None)?;
             let field = stage.field(node, name)?;
             let touched = stage.write(|graph| graph.touch(field));
             touched.map(drop).map_err(|e| stage.fault_at(node, name, e.to_string()).into()) as Outcome<()>
@@ -127,6 +129,7 @@ pub(crate) fn set(stage: &Stage, node: Node, field: &str, value: &Dynamic) -> Ou
             let Some(name) = value.read_lock::<ImmutableString>() else {
                 return stage.fault_at(node, "name", format!("a name is a string, not {}", show(value))).throw();
             };
+            stage.may_write(node, "name", None)?;
             let named = stage.write(|graph| graph.set_name(node.0, &name));
             named.map_err(|e| stage.fault_at(node, "name", e.to_string()).into())
         }

@@ -29,12 +29,14 @@ pub(super) fn teach(words: &mut Words<'_>) {
 
 fn route(stage: &Stage, from: (Node, &str), to: (Node, &str), strength: Strength) -> Outcome<()> {
     let (out, into) = (stage.field(from.0, from.1)?, stage.field(to.0, to.1)?);
+    stage.may_write(to.0, to.1, None)?;
     let made = stage.write(|graph| graph.connect(out, into, strength));
     made.map(drop).map_err(|e| stage.fault_at(to.0, to.1, e.to_string()).into())
 }
 
 fn unroute(stage: &Stage, from: (Node, &str), to: (Node, &str)) -> Outcome<()> {
     let (out, into) = (stage.field(from.0, from.1)?, stage.field(to.0, to.1)?);
+    stage.may_write(to.0, to.1, None)?;
     match stage.read(|graph| graph.route_between(out, into)) {
         Some(route) => {
             stage.write(|graph| graph.disconnect(route));

@@ -1,0 +1,310 @@
+//! The host's end: does what guests did, and tells them what became of it.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::time::{Duration, Instant};
+
+use crossbeam::channel::{Receiver, unbounded};
+use umbriel_fields::replica::{Bulk, Deed, node_numbered, number_of, own_key};
+use umbriel_fields::{Graph, NodeId, Value};
+use zenoh::Wait;
+use zenoh::pubsub::{Publisher as ZenohPublisher, Subscriber};
+use zenoh::qos::CongestionControl;
+use zenoh::query::{Query, Queryable};
+use zenoh::sample::SampleKind;
+
+use super::ownership::{GuestId, Ownership, OwnershipAction, OwnershipEvent};
+use crate::cluster::message::{
+    DEEDS, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word, bytes_of, message_of,
+};
+use crate::cluster::{ClusterError, Host};
+
+/// How long a guest that cannot be reached keeps its nodes and locks.
+const GRACE: Duration = Duration::from_secs(2);
+/// Guests make no more nodes once the world has so many.
+const MOST_NODES: usize = 1_000_000;
+
+enum Arrived {
+    Message(Vec<u8>),
+    Join(Query),
+    Token(u64, bool),
+}
+
+/// Where guests are served.
+pub struct Desk {
+    name: String,
+    arrived: Receiver<Arrived>,
+    words: ZenohPublisher<'static>,
+    ownership: Ownership,
+    started: Instant,
+    /// Messages that wait for one before them.
+    early: BTreeMap<(GuestId, u64), GuestMessage>,
+    joins: Vec<Query>,
+    /// The nodes of a guest by its own keys.
+    made: HashMap<GuestId, HashMap<u32, u64>>,
+    /// Nodes in whose lists a guest has put its own, by field.
+    lists: HashMap<GuestId, BTreeSet<(u64, String)>>,
+    bulk: Bulk,
+    changed: BTreeSet<u64>,
+    word: Word,
+    _held: (Vec<Subscriber<()>>, Queryable<()>),
+}
+
+fn network(error: zenoh::Error) -> ClusterError {
+    ClusterError::Network(error.to_string())
+}
+
+impl Desk {
+    /// Lets guests come to a host; `name` is what they call it.
+    pub fn open(host: &Host, name: &str) -> Result<Desk, ClusterError> {
+        let session = host.session();
+        let (sender, arrived) = unbounded();
+        let messages = sender.clone();
+        let take = move |sample: zenoh::sample::Sample| {
+            let _ = messages.send(Arrived::Message(sample.payload().to_bytes().into_owned()));
+        };
+        let mut subscribers = vec![session.declare_subscriber(DEEDS).callback(take).wait().map_err(network)?];
+        let gone = sender.clone();
+        let alive = session.liveliness().declare_subscriber(format!("{GUEST}/*")).callback(move |sample| {
+            let number = sample.key_expr().as_str().rsplit('/').next().and_then(|number| number.parse().ok());
+            if let Some(number) = number {
+                let _ = gone.send(Arrived::Token(number, sample.kind() == SampleKind::Put));
+            }
+        });
+        subscribers.push(alive.wait().map_err(network)?);
+        let joins = session.declare_queryable(GUEST_SNAPSHOT).callback(move |query| drop(sender.send(Arrived::Join(query))));
+        let queryable = joins.wait().map_err(network)?;
+        let words = session.declare_publisher(WORD).congestion_control(CongestionControl::Drop).wait().map_err(network)?;
+        Ok(Desk {
+            name: name.into(),
+            arrived,
+            words,
+            ownership: Ownership::new(GRACE.as_micros() as u64),
+            started: Instant::now(),
+            early: BTreeMap::new(),
+            joins: Vec::new(),
+            made: HashMap::new(),
+            lists: HashMap::new(),
+            bulk: Bulk::new(),
+            changed: BTreeSet::new(),
+            word: Word::default(),
+            _held: (subscribers, queryable),
+        })
+    }
+
+    /// Names of the guests that are there.
+    pub fn guests(&self) -> Vec<String> {
+        self.ownership.members().map(|(_, name, _)| name.to_string()).collect()
+    }
+
+    /// Does what guests did since the last frame. To be called at the beginning of one.
+    pub fn begin(&mut self, graph: &mut Graph) {
+        while let Ok(arrived) = self.arrived.try_recv() {
+            match arrived {
+                Arrived::Message(bytes) => match message_of::<GuestMessage>(&bytes) {
+                    Ok(message) => {
+                        let (guest, number) = (GuestId(message.guest), message.number);
+                        if self.ownership.has(guest) {
+                            self.early.insert((guest, number), message);
+                            self.step(OwnershipEvent::Arrived(guest, number), graph);
+                        }
+                    }
+                    Err(error) => tracing::warn!("from a guest: {error}"),
+                },
+                Arrived::Join(query) => self.joins.push(query),
+                Arrived::Token(guest, true) => self.step(OwnershipEvent::Found(GuestId(guest)), graph),
+                Arrived::Token(guest, false) => self.step(OwnershipEvent::Lost(GuestId(guest)), graph),
+            }
+        }
+        self.step(OwnershipEvent::Tick, graph);
+        let taken: BTreeMap<GuestId, u64> = self.ownership.members().map(|(guest, _, taken)| (guest, taken)).collect();
+        self.early.retain(|(guest, number), _| taken.get(guest).is_some_and(|taken| number > taken));
+    }
+
+    /// Tells guests what belongs to the next frame. To be called after evaluation, before the frame is published.
+    pub fn publish(&mut self, host: &Host, graph: &Graph) {
+        let gone: Vec<u64> = self.ownership.nodes().filter(|node| !graph.contains(node_numbered(*node))).collect();
+        for node in gone {
+            // A node that is gone has no owner; nothing else follows from it.
+            self.ownership.step(0, OwnershipEvent::Deleted(node));
+            self.changed.insert(node);
+        }
+        if self.ownership.members().next().is_none() && self.changed.is_empty() {
+            return;
+        }
+        let mut word = std::mem::take(&mut self.word);
+        word.whose = std::mem::take(&mut self.changed).into_iter().map(|node| self.whose(node)).collect();
+        self.head(&mut word, host.epoch(), host.last_frame() + 1);
+        if let Err(error) = self.words.put(bytes_of(&word)).wait() {
+            tracing::debug!("guests cannot be told: {error}");
+        }
+    }
+
+    fn head(&self, word: &mut Word, epoch: u64, frame: u64) {
+        (word.epoch, word.frame, word.host) = (epoch, frame, self.name.clone());
+        word.guests = self.ownership.members().map(|(guest, name, taken)| (guest.0, name.into(), taken)).collect();
+    }
+
+    fn whose(&self, node: u64) -> (u64, Option<u64>, Option<u64>) {
+        (node, self.ownership.owner(node).map(|guest| guest.0), self.ownership.holder(node).map(|guest| guest.0))
+    }
+
+    /// Lets in who asked for it. To be called after a frame was published, before the graph is written again.
+    pub fn welcome(&mut self, host: &mut Host, graph: &Graph) {
+        for query in std::mem::take(&mut self.joins) {
+            let join = query.payload().map(|payload| message_of::<GuestJoin>(&payload.to_bytes()));
+            let answer = match join {
+                Some(Ok(join)) => self.joins(host, graph, join),
+                Some(Err(error)) => Err(error.to_string()),
+                None => Err("it does not say who it is".into()),
+            };
+            let key = query.key_expr().clone();
+            let sent = match answer {
+                Ok(bytes) => query.reply(key, bytes).wait(),
+                Err(reason) => {
+                    tracing::warn!("a guest is refused: {reason}");
+                    query.reply_err(reason).wait()
+                }
+            };
+            if let Err(error) = sent {
+                tracing::debug!("an answer could not be sent: {error}");
+            }
+        }
+    }
+
+    fn joins(&mut self, host: &mut Host, graph: &Graph, join: GuestJoin) -> Result<Vec<u8>, String> {
+        if join.protocol != PROTOCOL {
+            return Err(format!("it speaks version {} of the protocol, the application speaks {PROTOCOL}", join.protocol));
+        }
+        let guest = GuestId(join.guest);
+        if self.ownership.twin(guest, &join.name).is_some() || join.name == self.name {
+            return Err(format!("there is an application `{}` already", join.name));
+        }
+        let snapshot = host.snapshot(graph).ok_or("the world is being written")?;
+        if !self.ownership.has(guest) {
+            tracing::info!("`{}` joins the world at frame {}", join.name, host.last_frame());
+        }
+        self.ownership.step(self.now_us(), OwnershipEvent::Joins { guest, name: join.name, keeps: join.keeps });
+        let made = self.made.entry(guest).or_default().iter().map(|(key, number)| (guest.0, *key, *number)).collect();
+        let whose = self.ownership.nodes().map(|node| self.whose(node)).collect();
+        let mut word = Word { made, whose, ..Word::default() };
+        self.head(&mut word, host.epoch(), host.last_frame());
+        Ok(bytes_of(&(word, &snapshot[..])))
+    }
+
+    fn now_us(&self) -> u64 {
+        self.started.elapsed().as_micros() as u64
+    }
+
+    fn step(&mut self, event: OwnershipEvent, graph: &mut Graph) {
+        for action in self.ownership.step(self.now_us(), event) {
+            match action {
+                OwnershipAction::Take(guest, number) => {
+                    if let Some(message) = self.early.remove(&(guest, number)) {
+                        self.take(guest, message, graph);
+                    }
+                }
+                OwnershipAction::Answer(guest, node, answer) => self.word.answers.push((guest.0, node, answer)),
+                OwnershipAction::Changed(node) => drop(self.changed.insert(node)),
+                OwnershipAction::Remove(node) => {
+                    self.changed.insert(node);
+                    let _ = graph.delete(node_numbered(node)); // the host may have deleted it before
+                }
+                OwnershipAction::Departed(guest, name) => {
+                    tracing::info!("`{name}` has left the world");
+                    self.made.remove(&guest);
+                    self.tidy(guest, graph);
+                }
+            }
+        }
+    }
+
+    /// Takes nodes that are gone out of the lists that a guest had put its own into.
+    fn tidy(&mut self, guest: GuestId, graph: &mut Graph) {
+        for (node, field) in self.lists.remove(&guest).unwrap_or_default() {
+            let Ok(field) = graph.field(node_numbered(node), &field) else { continue };
+            let Ok(Value::Nodes(nodes)) = graph.value(field) else { continue };
+            let alive = nodes.iter().copied().filter(|node| node.is_some_and(|node| graph.contains(node)));
+            let alive: Vec<Option<NodeId>> = alive.collect();
+            if alive.len() < nodes.len() {
+                let _ = graph.set_value(field, Value::Nodes(alive.into())); // a list of nodes takes a list of nodes
+            }
+        }
+    }
+
+    fn take(&mut self, guest: GuestId, message: GuestMessage, graph: &mut Graph) {
+        for (hash, image) in &message.images {
+            if let Err(error) = self.bulk.learn(*hash, image) {
+                tracing::warn!("from a guest: {error}");
+            }
+        }
+        for deed in &message.deeds {
+            if let Err(why) = self.deed(guest, deed, graph) {
+                self.word.refused.push((guest.0, why));
+            }
+        }
+        for request in message.requests {
+            let number = |node: u64| self.number(guest, node).filter(|node| graph.contains(node_numbered(*node)));
+            match request {
+                GuestRequest::Lock(node) => match number(node) {
+                    Some(node) => self.step(OwnershipEvent::Lock(guest, node), graph),
+                    None => self.word.answers.push((guest.0, node, Err("it is gone".into()))),
+                },
+                GuestRequest::Unlock(node) => {
+                    if let Some(node) = number(node) {
+                        self.step(OwnershipEvent::Unlock(guest, node), graph);
+                    }
+                }
+                GuestRequest::Keeps(keeps) => self.step(OwnershipEvent::Keeps(guest, keeps), graph),
+                GuestRequest::Leave => self.step(OwnershipEvent::Leaves(guest), graph),
+            }
+        }
+    }
+
+    /// The host's number of a node that a guest names.
+    fn number(&self, guest: GuestId, node: u64) -> Option<u64> {
+        match own_key(node) {
+            Some(key) => self.made.get(&guest)?.get(&key).copied(),
+            None => Some(node).filter(|node| *node != 0),
+        }
+    }
+
+    fn deed(&mut self, guest: GuestId, deed: &Deed, graph: &mut Graph) -> Result<(), String> {
+        let target = deed.changes().map(|node| self.number(guest, node).ok_or("its node is gone".to_string())).transpose()?;
+        if let Some(node) = target {
+            let may = match deed.lists() {
+                Some(nodes) => {
+                    // Who may write the node may do that to its lists as well.
+                    let nodes: Vec<u64> = nodes.filter_map(|node| self.number(guest, node)).collect();
+                    self.ownership.may_write(guest, node).or_else(|_| self.ownership.may_list(guest, node, nodes.into_iter()))
+                }
+                None => self.ownership.may_write(guest, node),
+            };
+            let what = |why: String| match deed.field() {
+                Some(field) => format!("`{field}` of {}: {why}", graph.describe(node_numbered(node))),
+                None => format!("{}: {why}", graph.describe(node_numbered(node))),
+            };
+            may.map_err(what)?;
+        }
+        if deed.makes().is_some() && graph.node_count() >= MOST_NODES {
+            return Err(format!("the world has {MOST_NODES} nodes already, and more are not allowed"));
+        }
+        let made = self.made.get(&guest);
+        let found = |number: u64| match own_key(number) {
+            Some(key) => made.and_then(|made| made.get(&key)).map(|number| node_numbered(*number)),
+            None => Some(number).filter(|number| *number != 0).map(node_numbered),
+        };
+        let new = deed.apply(graph, &self.bulk, &found)?;
+        if let (Some(node), Some(key)) = (new.map(number_of), deed.makes().and_then(own_key)) {
+            self.made.entry(guest).or_default().insert(key, node);
+            self.word.made.push((guest.0, key, node));
+            self.step(OwnershipEvent::Made(guest, node), graph);
+        }
+        if let (true, Some(node), Some(field)) = (deed.lists().is_some(), target, deed.field()) {
+            self.lists.entry(guest).or_default().insert((node, field.into()));
+        }
+        if let (Some(_), Some(node)) = (deed.deletes(), target) {
+            self.step(OwnershipEvent::Deleted(node), graph);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,523 @@
+//! A guest's end: follows the host's world, and tells what is done to the copy here.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use crossbeam::channel::{Receiver, Sender, unbounded};
+use umbriel_fields::replica::{Bulk, Mirror, Packet, Replica};
+use umbriel_fields::{Graph, NodeId, TypeRegistry};
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::{Publisher as ZenohPublisher, Subscriber};
+use zenoh::qos::CongestionControl;
+use zenoh::sample::SampleKind;
+use zenoh::{Session, Wait};
+
+use crate::cluster::message::{
+    APPLICATION, BULK, DEEDS, FRAME, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word,
+    bytes_of, message_of, unstamped,
+};
+use crate::cluster::transport::{End, open};
+use crate::cluster::{ClusterError, Security};
+
+/// What is not confirmed after so long is sent again.
+const RESEND: Duration = Duration::from_millis(500);
+/// How long a frame waits for one before it.
+const GAP: Duration = Duration::from_millis(300);
+/// How often who is not let in asks.
+const ASK: Duration = Duration::from_millis(300);
+/// A guest that crashed and comes back at once finds its own name taken until it is given up.
+const NAME_IS_FREE_AFTER: Duration = Duration::from_secs(5);
+
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum News {
+    /// Nothing yet.
+    None,
+    /// The world is here, from its beginning for this guest: whatever it made before is gone. [`Guest::enter`] follows.
+    Begins,
+    /// A later frame is here, at this time of the world in seconds. [`Guest::follow`] follows.
+    Frame(f64),
+    /// The host is gone; it may come back.
+    HostGone,
+}
+
+/// What a script asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wish {
+    /// To be the only one who may write a node.
+    Lock(NodeId),
+    /// No longer to be.
+    Unlock(NodeId),
+    /// Whether the nodes stay when it leaves.
+    Keeps(bool),
+}
+
+enum Arrived {
+    Frame(Vec<u8>),
+    Word(Vec<u8>),
+    World(Result<Vec<u8>, String>),
+    Bulk(u64, Result<Vec<u8>, String>),
+    Host(bool),
+}
+
+/// Whose nodes are whose, by name. Nodes that stand nowhere are the guest's own.
+#[derive(Clone, Debug, Default)]
+pub struct Whose {
+    /// Owners of the nodes of others.
+    pub owners: HashMap<NodeId, Arc<str>>,
+    /// Who has locked a node.
+    pub locks: HashMap<NodeId, Arc<str>>,
+    /// Answers about locks that were asked for.
+    pub answers: Vec<(NodeId, Result<(), String>)>,
+}
+
+/// An application in another one's world.
+pub struct Guest {
+    session: Session,
+    id: u64,
+    name: Arc<str>,
+    keeps: bool,
+    arrived: Receiver<Arrived>,
+    sender: Sender<Arrived>,
+    deeds: ZenohPublisher<'static>,
+    fresh: fn() -> Graph,
+    /// The one that is entered next, and the types of the one that was entered.
+    graph: Graph,
+    types: TypeRegistry,
+    bulk: Bulk,
+    asked_bulk: BTreeSet<u64>,
+    epoch: u64,
+    replica: Option<Replica>,
+    mirror: Option<Mirror>,
+    /// A snapshot that waits for long values.
+    world: Option<(Word, Vec<u8>)>,
+    packets: BTreeMap<u64, Vec<u8>>,
+    words: BTreeMap<u64, Word>,
+    gap_since: Option<Instant>,
+    /// Words of the frames that were taken over since the last `follow`.
+    heard: Vec<Word>,
+    names: BTreeMap<u64, Arc<str>>,
+    host: Arc<str>,
+    sent: u64,
+    applied: u64,
+    unconfirmed: BTreeMap<u64, (Vec<u8>, Instant)>,
+    locks_asked: BTreeSet<NodeId>,
+    asked: Option<Instant>,
+    refused_since: Option<Instant>,
+    is_leaving: bool,
+    _held: (Vec<Subscriber<()>>, LivelinessToken),
+}
+
+fn network(error: zenoh::Error) -> ClusterError {
+    ClusterError::Network(error.to_string())
+}
+
+impl Guest {
+    /// Joins the host at an address, now or as soon as it is there. `keeps` says whether its nodes stay when it leaves,
+    /// `fresh` makes graphs for its world, with no nodes but a Group `world`.
+    pub fn connect(
+        endpoint: &str,
+        security: &Security,
+        name: &str,
+        keeps: bool,
+        fresh: fn() -> Graph,
+    ) -> Result<Guest, ClusterError> {
+        let session = open(endpoint, security, End::Display)?;
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
+        let id = since ^ (std::process::id() as u64) << 40;
+        let (sender, arrived) = unbounded();
+        let mut subscribers = Vec::new();
+        for (key, kind) in [(FRAME, Arrived::Frame as fn(Vec<u8>) -> Arrived), (WORD, Arrived::Word)] {
+            let sender = sender.clone();
+            let take = move |sample: zenoh::sample::Sample| drop(sender.send(kind(sample.payload().to_bytes().into_owned())));
+            subscribers.push(session.declare_subscriber(key).callback(take).wait().map_err(network)?);
+        }
+        let host = sender.clone();
+        let alive = session.liveliness().declare_subscriber(APPLICATION).history(true).callback(move |sample| {
+            let _ = host.send(Arrived::Host(sample.kind() == SampleKind::Put));
+        });
+        subscribers.push(alive.wait().map_err(network)?);
+        let deeds = session.declare_publisher(DEEDS).congestion_control(CongestionControl::Block).wait().map_err(network)?;
+        let token = session.liveliness().declare_token(format!("{GUEST}/{id}")).wait().map_err(network)?;
+        Ok(Guest {
+            session,
+            id,
+            name: name.into(),
+            keeps,
+            arrived,
+            sender,
+            deeds,
+            fresh,
+            graph: fresh(),
+            types: TypeRegistry::new(),
+            bulk: Bulk::new(),
+            asked_bulk: BTreeSet::new(),
+            epoch: 0,
+            replica: None,
+            mirror: None,
+            world: None,
+            packets: BTreeMap::new(),
+            words: BTreeMap::new(),
+            gap_since: None,
+            heard: Vec::new(),
+            names: BTreeMap::new(),
+            host: "".into(),
+            sent: 0,
+            applied: 0,
+            unconfirmed: BTreeMap::new(),
+            locks_asked: BTreeSet::new(),
+            asked: None,
+            refused_since: None,
+            is_leaving: false,
+            _held: (subscribers, token),
+        })
+    }
+
+    /// True once the host was heard of.
+    pub fn found_host(&self) -> bool {
+        self.epoch > 0
+    }
+
+    /// The name of the application that evaluates.
+    pub fn host(&self) -> &Arc<str> {
+        &self.host
+    }
+
+    /// The number of the last frame that was taken over.
+    pub fn frame(&self) -> u64 {
+        self.replica.as_ref().map_or(0, Replica::frame)
+    }
+
+    /// Waits for the next frame, but not longer than `patience`.
+    ///
+    /// # Errors
+    /// The host refuses this guest.
+    pub fn next(&mut self, patience: Duration) -> Result<News, ClusterError> {
+        let until = Instant::now() + patience;
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            let mut news = News::None;
+            let mut arrived = self.arrived.recv_timeout(left.min(Duration::from_millis(5))).ok();
+            while let Some(next) = arrived {
+                if let Some(found) = self.handle(next)? {
+                    news = found;
+                }
+                arrived = self.arrived.try_recv().ok();
+            }
+            self.ask_for_the_world();
+            self.resend();
+            if news == News::None {
+                news = self.progress();
+            }
+            if news != News::None || left.is_zero() {
+                return Ok(news);
+            }
+        }
+    }
+
+    fn handle(&mut self, arrived: Arrived) -> Result<Option<News>, ClusterError> {
+        match arrived {
+            Arrived::Frame(bytes) => {
+                let frame = unstamped(&bytes).map(|(epoch, packet)| (epoch, Packet::read(packet)));
+                match frame {
+                    Some((epoch, Ok(packet))) if epoch == self.epoch => {
+                        let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
+                        self.ask_for_bulk(missing);
+                        self.packets.insert(frame, bytes);
+                    }
+                    Some((_, Err(error))) => tracing::error!("a frame cannot be used: {error}"),
+                    _ => {}
+                }
+            }
+            Arrived::Word(bytes) => match message_of::<Word>(&bytes) {
+                Ok(word) if word.epoch == self.epoch => {
+                    if self.replica.is_some() && !word.guests.iter().any(|(id, ..)| *id == self.id) {
+                        // It was given up: its nodes are gone, or the host's.
+                        if !self.is_leaving {
+                            tracing::warn!("this application was away for too long; it joins anew");
+                        }
+                        self.forget();
+                    }
+                    self.words.insert(word.frame, word);
+                }
+                Ok(_) => {}
+                Err(error) => tracing::error!("{error}"),
+            },
+            Arrived::World(Ok(bytes)) => {
+                self.refused_since = None;
+                let (word, snapshot) = message_of::<(Word, Vec<u8>)>(&bytes)?;
+                self.world = Some((word, snapshot));
+            }
+            Arrived::World(Err(reason)) if reason.starts_with("there is an application") => {
+                let since = *self.refused_since.get_or_insert_with(Instant::now);
+                if since.elapsed() > NAME_IS_FREE_AFTER {
+                    return Err(ClusterError::GuestRefused(reason));
+                }
+            }
+            Arrived::World(Err(reason)) if reason.starts_with("it ") => return Err(ClusterError::GuestRefused(reason)),
+            Arrived::World(Err(reason)) => tracing::debug!("no world: {reason}"),
+            Arrived::Bulk(hash, answer) => {
+                self.asked_bulk.remove(&hash);
+                match answer {
+                    Ok(bytes) => {
+                        if let Err(error) = self.bulk.learn(hash, &bytes) {
+                            tracing::error!("{error}");
+                        }
+                    }
+                    // What waits for it is of the past: a new snapshot knows what is needed now.
+                    Err(reason) => {
+                        tracing::debug!("no long value {hash:016x}: {reason}");
+                        self.fetch_again();
+                    }
+                }
+            }
+            Arrived::Host(true) => self.asked = None,
+            Arrived::Host(false) => {
+                self.forget();
+                return Ok(Some(News::HostGone));
+            }
+        }
+        Ok(None)
+    }
+
+    /// What was here is another world's.
+    fn forget(&mut self) {
+        (self.replica, self.mirror, self.world) = (None, None, None);
+        self.packets.clear();
+        self.words.clear();
+        self.heard.clear();
+        self.unconfirmed.clear();
+        self.locks_asked.clear();
+        (self.epoch, self.sent, self.applied, self.asked) = (0, 0, 0, None);
+    }
+
+    fn fetch_again(&mut self) {
+        self.world = None;
+        self.replica = None;
+        self.gap_since = None;
+    }
+
+    fn ask_for_the_world(&mut self) {
+        let waits = self.replica.is_none() && self.world.is_none() && !self.is_leaving;
+        if waits && self.asked.is_none_or(|asked| asked.elapsed() > ASK) {
+            self.asked = Some(Instant::now());
+            let join = GuestJoin { protocol: PROTOCOL, guest: self.id, name: self.name.to_string(), keeps: self.keeps };
+            self.get(GUEST_SNAPSHOT.into(), bytes_of(&join), Arrived::World);
+        }
+    }
+
+    fn ask_for_bulk(&mut self, missing: Vec<u64>) {
+        for hash in missing {
+            if self.asked_bulk.insert(hash) {
+                self.get(format!("{BULK}/{hash:016x}"), Vec::new(), move |answer| Arrived::Bulk(hash, answer));
+            }
+        }
+    }
+
+    fn get(&self, key: String, payload: Vec<u8>, arrived: impl Fn(Result<Vec<u8>, String>) -> Arrived + Send + Sync + 'static) {
+        let sender = self.sender.clone();
+        let sent = self.session.get(key).payload(payload).timeout(Duration::from_secs(5)).callback(move |reply| {
+            let answer = match reply.into_result() {
+                Ok(sample) => Ok(sample.payload().to_bytes().into_owned()),
+                Err(error) => Err(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()),
+            };
+            let _ = sender.send(arrived(answer));
+        });
+        if let Err(error) = sent.wait() {
+            tracing::debug!("cannot ask: {error}");
+        }
+    }
+
+    fn resend(&mut self) {
+        for (bytes, sent) in self.unconfirmed.values_mut().filter(|(_, sent)| sent.elapsed() > RESEND) {
+            *sent = Instant::now();
+            if let Err(error) = self.deeds.put(bytes.clone()).wait() {
+                tracing::debug!("cannot tell: {error}");
+            }
+        }
+    }
+
+    /// Takes over what is complete.
+    fn progress(&mut self) -> News {
+        if let Some(news) = self.take_world() {
+            return news;
+        }
+        let mut news = News::None;
+        while let Some(next) = self.replica.as_ref().map(|replica| replica.frame() + 1) {
+            let (Some(bytes), true) = (self.packets.get(&next), self.words.contains_key(&next)) else { break };
+            let packet = unstamped(bytes).and_then(|(_, packet)| Packet::read(packet).ok());
+            let Some(packet) = packet.filter(|packet| packet.missing(&self.bulk).is_empty()) else { break };
+            let Some(replica) = &mut self.replica else { break };
+            match replica.apply(&packet, &self.bulk) {
+                Ok(()) if replica.agrees() => {
+                    self.gap_since = None;
+                    news = News::Frame(replica.time_s());
+                    self.heard.extend(self.words.remove(&next));
+                    self.packets.remove(&next);
+                }
+                other => {
+                    tracing::error!(
+                        "frame {next} cannot be used ({}); fetching the world",
+                        other.err().map_or("it differs".into(), |e| e.to_string())
+                    );
+                    self.fetch_again();
+                }
+            }
+        }
+        if let (News::None, Some(replica)) = (news, &self.replica) {
+            let last = replica.frame();
+            let later = self.packets.keys().chain(self.words.keys()).any(|frame| *frame > last);
+            match (later, self.gap_since) {
+                (false, _) => self.gap_since = None,
+                (true, None) => self.gap_since = Some(Instant::now()),
+                (true, Some(since)) if since.elapsed() > GAP && self.asked_bulk.is_empty() => self.fetch_again(),
+                _ => {}
+            }
+        }
+        news
+    }
+
+    fn take_world(&mut self) -> Option<News> {
+        let (word, bytes) = self.world.as_ref()?;
+        let (epoch, packet) = unstamped(bytes)?;
+        let packet = Packet::read(packet).inspect_err(|error| tracing::error!("the world cannot be used: {error}")).ok()?;
+        let missing = packet.missing(&self.bulk);
+        if !missing.is_empty() {
+            self.ask_for_bulk(missing);
+            return None;
+        }
+        let word = word.clone();
+        let applied = word.guests.iter().find(|(id, ..)| *id == self.id).map_or(0, |(.., applied)| *applied);
+        let is_first = self.epoch != epoch || self.mirror.is_none() || applied < self.applied;
+        if is_first {
+            self.graph = (self.fresh)();
+            self.types = self.graph.types().clone();
+            (self.mirror, self.sent, self.applied) = (None, 0, 0);
+            self.unconfirmed.clear();
+            self.locks_asked.clear();
+        }
+        let made = Replica::new(&packet, self.types.clone(), &self.bulk);
+        self.world = None;
+        let replica = made.inspect_err(|error| tracing::error!("the world cannot be used: {error}")).ok()?;
+        let (frame, time_s) = (replica.frame(), replica.time_s());
+        self.packets = self.packets.split_off(&(frame + 1));
+        self.words = self.words.split_off(&(frame + 1));
+        self.epoch = epoch;
+        self.replica = Some(replica);
+        self.heard = vec![word];
+        if let Some(mirror) = &mut self.mirror {
+            mirror.restart();
+        }
+        Some(if is_first { News::Begins } else { News::Frame(time_s) })
+    }
+
+    /// A graph of the world, and whose its nodes are; after [`News::Begins`]. What is done to it from then on is told.
+    pub fn enter(&mut self) -> (Graph, Whose) {
+        let (mut graph, mut whose) = (std::mem::replace(&mut self.graph, (self.fresh)()), Whose::default());
+        self.mirror = Some(Mirror::of(&mut graph));
+        self.follow(&mut graph, &mut whose);
+        (graph, whose)
+    }
+
+    /// Takes over into the graph what is new in the world.
+    pub fn follow(&mut self, graph: &mut Graph, whose: &mut Whose) {
+        let (Some(mirror), Some(replica)) = (&mut self.mirror, &self.replica) else { return };
+        let heard = std::mem::take(&mut self.heard);
+        for word in &heard {
+            self.host = word.host.as_str().into();
+            self.names = word.guests.iter().map(|(id, name, _)| (*id, name.as_str().into())).collect();
+            for (_, key, number) in word.made.iter().filter(|(guest, ..)| *guest == self.id) {
+                mirror.made(*key, *number);
+            }
+            if let Some((.., applied)) = word.guests.iter().find(|(id, ..)| *id == self.id) {
+                self.applied = self.applied.max(*applied);
+            }
+            for (_, why) in word.refused.iter().filter(|(guest, _)| *guest == self.id) {
+                tracing::error!("not done: {why}");
+            }
+        }
+        self.unconfirmed = self.unconfirmed.split_off(&(self.applied + 1));
+        mirror.follow(replica, graph, self.applied);
+        for (node, is_here) in mirror.foreign() {
+            match is_here {
+                true => drop(whose.owners.insert(node, self.host.clone())),
+                false => {
+                    whose.owners.remove(&node);
+                    whose.locks.remove(&node);
+                }
+            }
+        }
+        for word in &heard {
+            for (number, owner, holder) in &word.whose {
+                let Some(node) = mirror.node(*number) else { continue };
+                let name = |guest: &u64| self.names.get(guest).cloned().unwrap_or_else(|| "?".into());
+                match owner {
+                    Some(owner) if *owner == self.id => drop(whose.owners.remove(&node)),
+                    Some(owner) => drop(whose.owners.insert(node, name(owner))),
+                    None => drop(whose.owners.insert(node, self.host.clone())),
+                }
+                match holder {
+                    Some(holder) => drop(whose.locks.insert(node, name(holder))),
+                    None => drop(whose.locks.remove(&node)),
+                }
+            }
+            for (_, number, answer) in word.answers.iter().filter(|(guest, ..)| *guest == self.id) {
+                if let Some(node) = mirror.node(*number).filter(|node| self.locks_asked.remove(node)) {
+                    whose.answers.push((node, answer.clone()));
+                }
+            }
+        }
+    }
+
+    /// Tells what was done to the graph since the last time, and what is wished for.
+    pub fn tell(&mut self, graph: &mut Graph, whose: &Whose, wishes: &[Wish]) {
+        let (Some(mirror), Some(replica)) = (&mut self.mirror, &self.replica) else { return };
+        let is_ours = |node: NodeId| match whose.locks.get(&node) {
+            Some(holder) => *holder == self.name,
+            None => !whose.owners.contains_key(&node),
+        };
+        let told = mirror.deeds(graph, replica, self.sent + 1, &is_ours);
+        let mut requests = Vec::new();
+        for wish in wishes {
+            requests.extend(match wish {
+                Wish::Lock(node) => {
+                    self.locks_asked.insert(*node);
+                    mirror.number(*node).map(GuestRequest::Lock)
+                }
+                Wish::Unlock(node) => mirror.number(*node).map(GuestRequest::Unlock),
+                Wish::Keeps(keeps) => {
+                    self.keeps = *keeps;
+                    Some(GuestRequest::Keeps(*keeps))
+                }
+            });
+        }
+        if !told.deeds.is_empty() || !requests.is_empty() {
+            self.send(told.deeds, told.images, requests);
+        }
+    }
+
+    fn send(&mut self, deeds: Vec<umbriel_fields::replica::Deed>, images: Vec<(u64, Vec<u8>)>, requests: Vec<GuestRequest>) {
+        self.sent += 1;
+        let bytes = bytes_of(&GuestMessage { guest: self.id, number: self.sent, deeds, images, requests });
+        if let Err(error) = self.deeds.put(bytes.clone()).wait() {
+            tracing::debug!("cannot tell: {error}");
+        }
+        self.unconfirmed.insert(self.sent, (bytes, Instant::now()));
+    }
+
+    /// Says good-bye, and waits a moment until everything that was told is done.
+    pub fn leave(mut self) {
+        if self.replica.is_none() {
+            return;
+        }
+        self.is_leaving = true;
+        self.send(Vec::new(), Vec::new(), vec![GuestRequest::Leave]);
+        let until = Instant::now() + Duration::from_secs(1);
+        while Instant::now() < until && self.replica.is_some() && self.epoch > 0 {
+            if self.next(Duration::from_millis(20)).is_err() {
+                break;
+            }
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Several applications in one world: processes that make, lock, refuse, die and leave.
+
+use crate::support::until;
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// A running command, and what it said so far.
+struct Process {
+    child: Child,
+    said: Arc<Mutex<String>>,
+}
+
+impl Process {
+    fn start(args: &[&str]) -> Process {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_umbriel"))
+            .args(args)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the command can be started");
+        let said = Arc::new(Mutex::new(String::new()));
+        let (out, err) = (child.stdout.take().expect("piped"), child.stderr.take().expect("piped"));
+        listen(out, &said);
+        listen(err, &said);
+        Process { child, said }
+    }
+
+    fn said(&self) -> String {
+        self.said.lock().unwrap().clone()
+    }
+
+    /// Waits until it said something.
+    fn says(&self, text: &str) {
+        let found = until(PATIENCE, || self.said().contains(text).then_some(()));
+        assert!(found.is_some(), "it did not say `{text}`, but:\n{}", self.said());
+    }
+
+    /// Waits for its end; gives the exit status.
+    fn ends(&mut self) -> i32 {
+        let status = until(PATIENCE, || self.child.try_wait().ok().flatten());
+        status.unwrap_or_else(|| panic!("it does not end:\n{}", self.said())).code().unwrap_or(-1)
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn listen(from: impl std::io::Read + Send + 'static, said: &Arc<Mutex<String>>) {
+    let said = said.clone();
+    std::thread::spawn(move || {
+        for line in BufReader::new(from).lines().map_while(Result::ok) {
+            said.lock().unwrap().push_str(&(line + "\n"));
+        }
+    });
+}
+
+/// A folder with scripts, and an address on which nobody listens.
+fn prepare(name: &str, scripts: &[(&str, &str)]) -> (PathBuf, String) {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    for (file, text) in scripts {
+        std::fs::write(folder.join(file), text).unwrap();
+    }
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    (folder, format!("tcp/127.0.0.1:{port}"))
+}
+
+const HOST: &str = r#"
+world.add(transform(#{ name: "ball" }, []));
+let clock = make("TimeSensor", #{ name: "clock", cycle_interval: 1.0, loop: true });
+let count = make("Group", #{ name: "count" }); count.add_field("n", 0);
+on_frame(|t, dt| { count.n += 1; if count.n % 20 == 0 {
+    let names = []; for child in world.children { names.push(child.name); }
+    let box = find("second_box");
+    print(`world ${names} ball ${find("ball").translation.x}${if box == () { "" } else { ` box ${box.translation.x}` }}`);
+} });"#;
+
+/// Locks the ball and holds it until it is killed.
+const FIRST: &str = r#"
+on_leave("keep");
+world.add(transform(#{ name: "first_box" }, []));
+let ball = find("ball");
+lock(ball, |granted, why| { print(`first: ${granted}`); if granted { ball.translation = vec3(1, 0, 0); } });"#;
+
+/// Wants the ball too, and may neither write it nor what the first one made.
+const SECOND: &str = r#"
+let box = transform(#{ name: "second_box" }, []);
+world.add(box);
+let path = make("PositionInterpolator", #{ key: [0.0, 1.0], key_value: [vec3(3, 0, 0), vec3(3, 0, 0)] });
+route(find("clock"), "fraction_changed", path, "set_fraction");
+route(path, "value_changed", box, "translation");
+let ball = find("ball");
+let state = make("Group", #{ name: "state" }); state.add_field("told", false); state.add_field("waits", false); state.add_field("has", false);
+let other = find("first_box");
+try { other.translation = vec3(0, 1, 0); } catch (e) { print(`not written: ${e}`); }
+try { ball.children = [ball]; } catch (e) { print(`not put: ${e}`); }
+on_frame(|t, dt| {
+    if state.has || state.waits { return; }
+    state.waits = true;
+    lock(ball, |granted, why| {
+        state.waits = false; state.has = granted;
+        if granted { print("second has it"); ball.translation = vec3(2, 0, 0); } else if !state.told { state.told = true; print(`second: ${why}`); }
+    });
+});"#;
+
+#[test]
+fn applications_share_a_world_and_locks_of_the_dead_expire() {
+    let (folder, address) = prepare("applications", &[("host.rhai", HOST), ("first.rhai", FIRST), ("second.rhai", SECOND)]);
+    let path = |file: &str| folder.join(file).to_string_lossy().into_owned();
+    let host = Process::start(&["serve", &path("host.rhai"), "--listen", &address]);
+    let mut first = Process::start(&["join", &path("first.rhai"), "--connect", &address]);
+    first.says("first: true");
+    host.says(r#"world ["ball", "first_box"] ball 1"#);
+    let mut second = Process::start(&["join", &path("second.rhai"), "--connect", &address]);
+    second.says("not written: `translation` of `first_box` (Transform): it belongs to `first`");
+    second.says("not put: `children` of `ball` (Transform): `first` has locked it");
+    second.says("second: `first` has locked it");
+    // Its name is taken.
+    let mut twin = Process::start(&["join", &path("second.rhai"), "--connect", &address]);
+    first.child.kill().unwrap();
+    second.says("second has it");
+    host.says(r#"world ["ball", "first_box", "second_box"] ball 2.0 box 3.0"#);
+    assert_eq!(twin.ends(), 1, "{}", twin.said());
+    twin.says("the host refuses this application: there is an application `second` already");
+    // What the second one made goes, what it did to others stays.
+    let interrupted = Command::new("kill").args(["-INT", &second.child.id().to_string()]).status().unwrap();
+    assert!(interrupted.success());
+    assert_eq!(second.ends(), 0, "{}", second.said());
+    host.says("`second` has left the world");
+    let before = host.said().len();
+    let after = until(PATIENCE, || host.said()[before..].contains(r#"world ["ball", "first_box"] ball 2"#).then_some(()));
+    assert!(after.is_some(), "{}", host.said());
+}
