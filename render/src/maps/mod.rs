@@ -130,7 +130,8 @@ impl Maps {
             }
             let fits = fits_of(light, size, around);
             let held = self.held.get(&index).filter(|h| !h.is_empty() && light.map.update == MapUpdate::Never);
-            let held = held.filter(|h| h.iter().all(|h| h.light.map.request == light.map.request));
+            let is_same_kind = |h: &Held| std::mem::discriminant(&h.light.kind) == std::mem::discriminant(&light.kind);
+            let held = held.filter(|h| h.iter().all(|h| is_same_kind(h) && h.light.map.request == light.map.request));
             let is_frozen = held.is_some_and(|h| light.kind == LightKind::Directional || h.len() == fits.len());
             let faces = held.filter(|_| is_frozen).map_or(fits.len(), Vec::len);
             let level = share::level(light, &around.eyes, self.levels.get(&index).copied());
@@ -141,8 +142,7 @@ impl Maps {
             self.held.clear();
             return false;
         }
-        let demands: Vec<Demand> = wanted.iter().map(|w| w.demand).collect();
-        let (tiles, is_new) = self.make_room(device, demands, scene.map_memory_bytes);
+        let (tiles, is_new) = self.make_room(device, &wanted, scene.map_memory_bytes);
         let snapshot = Arc::new(Snapshot { casters, radius: around.casters.radius() });
         let mut motions: HashMap<*const Snapshot, Motion> = HashMap::new();
         let mut old = std::mem::take(&mut self.held);
@@ -231,29 +231,44 @@ impl Maps {
         all
     }
 
-    /// Places for the maps of every light, in a texture that is as large as they need and memory allows. True where it is
-    /// a new one.
+    /// Places for the maps of every light, in a texture that is as large as they need and memory allows. Maps stay where they
+    /// lie, as long as the texture is not twice as large as it must be. True where it is a new one.
     fn make_room(
         &mut self,
         device: &wgpu::Device,
-        demands: Vec<Demand>,
+        wanted: &[Wanted],
         memory_bytes: u64,
     ) -> (Vec<Vec<(u32, atlas::Place)>>, bool) {
         let most_layers = device.limits().max_texture_array_layers;
+        let demands: Vec<Demand> = wanted.iter().map(|w| w.demand).collect();
         if self.room.0 != demands || self.room.1 != memory_bytes {
             let sides = share::sides(&demands, memory_bytes, most_layers);
             self.room = (demands, memory_bytes, sides);
         }
-        let (demands, _, sides) = &self.room;
-        let all: Vec<u32> = demands.iter().zip(sides).flat_map(|(d, side)| std::iter::repeat_n(*side, d.faces)).collect();
-        let (side, layers, places) = atlas::pack(&all);
+        let (_, _, sides) = &self.room;
+        let faces = || wanted.iter().zip(sides).flat_map(|(w, side)| (0..w.demand.faces).map(move |i| (w.index, i, *side)));
+        let all: Vec<u32> = faces().map(|(_, _, side)| side).collect();
+        let lies = |(light, i, side): (usize, usize, u32)| {
+            let held = self.held.get(&light).and_then(|held| held.get(i))?;
+            (held.tile.0 == side).then_some(held.tile.1)
+        };
+        let lying: Vec<Option<atlas::Place>> = faces().map(lies).collect();
+        let (mut side, mut layers, mut places) = atlas::pack(&all);
         let now = self.texture.size();
+        if now.width >= side {
+            let (layers_around, places_around) = atlas::pack_around(now.width, &all, &lying);
+            let layers_around = layers_around.max(now.depth_or_array_layers);
+            let bytes = atlas::bytes(now.width, layers_around);
+            if layers_around <= most_layers && bytes <= memory_bytes && bytes <= 2 * atlas::bytes(side, layers) {
+                (side, layers, places) = (now.width, layers_around, places_around);
+            }
+        }
         let is_new = (now.width, now.depth_or_array_layers) != (side, layers.max(2));
         if is_new {
             (self.texture, self.whole, self.layers) = make_texture(device, side, layers);
         }
         let mut tiles = all.into_iter().zip(places);
-        (demands.iter().map(|d| tiles.by_ref().take(d.faces).collect()).collect(), is_new)
+        (wanted.iter().map(|w| tiles.by_ref().take(w.demand.faces).collect()).collect(), is_new)
     }
 
     /// Finds the casters of every map and the pipelines that they need.
@@ -397,6 +412,6 @@ fn make_texture(device: &wgpu::Device, side: u32, layers: u32) -> (wgpu::Texture
             ..Default::default()
         })
     };
-    let layers = (0..layers).map(layer).collect();
+    let layers = (0..layers.max(2)).map(layer).collect();
     (texture, whole, layers)
 }

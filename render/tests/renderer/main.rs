@@ -1,6 +1,7 @@
 //! Pictures of scenes made in code, compared with numbers that follow from the scene.
 
 mod author;
+mod contact;
 mod deformation;
 mod layouts;
 mod lights;

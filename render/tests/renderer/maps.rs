@@ -179,6 +179,45 @@ fn many_lights_share_the_memory() {
 }
 
 #[test]
+fn a_map_of_another_size_leaves_the_others_alone() {
+    let lights = (0..4).map(|i| lamp(Vec3::new(4.0 * i as f32 - 6.0, 5.0, 0.0), cone(), 1)).collect();
+    let still = balls(&[[0.0, 1.0, 0.0]], lights);
+    let with = |sizes: [u32; 4]| {
+        let mut scene = still.clone();
+        scene.lights.iter_mut().zip(sizes).for_each(|(light, size)| light.map.size = size);
+        scene
+    };
+    // Sizes, and which maps are drawn.
+    let steps = [
+        ("all are new", [256, 64, 64, 64], [1, 1, 1, 1]),
+        ("the second grows", [256, 128, 64, 64], [0, 1, 0, 0]),
+        ("the third shrinks", [256, 128, 16, 64], [0, 0, 1, 0]),
+        ("two change", [256, 64, 100, 64], [0, 1, 1, 0]),
+        ("the first shrinks", [200, 64, 100, 64], [1, 0, 0, 0]),
+        ("the first is small", [32, 32, 32, 32], [1, 1, 1, 1]),
+    ];
+    let scenes: Vec<Scene> = steps.iter().map(|s| with(s.1)).collect();
+    for ((name, _, expected), stats) in steps.iter().zip(frames(&scenes, &[overview()])) {
+        let redrawn: Vec<u32> = stats.map_shares.iter().map(|s| s.redrawn).collect();
+        assert_eq!(redrawn, expected, "{name}");
+    }
+}
+
+/// The kind of a light may change while its map is frozen: six maps of a lamp are no map of the sun.
+#[test]
+fn a_frozen_map_of_another_kind_of_light_is_drawn() {
+    let kinds = [LightKind::Point, LightKind::Directional, cone(), LightKind::Point];
+    let still = balls(&[[0.0, 1.0, 0.0]], vec![lamp(Vec3::new(0.0, 6.0, 0.0), LightKind::Point, 64)]);
+    let scene = |kind| {
+        let mut scene = still.clone();
+        (scene.lights[0].kind, scene.lights[0].map.update) = (kind, MapUpdate::Never);
+        scene
+    };
+    let stats = frames(&kinds.map(scene), &[overview()]);
+    assert!(stats.iter().all(|s| s.map_redraws > 0 && s.map_redraws == s.map_shares[0].maps), "{stats:?}");
+}
+
+#[test]
 fn outside_of_a_frustum_by_hand_is_as_chosen() {
     let map = MapSettings { size: 128, frustum: Some([-1.0, 1.0, -1.0, 1.0]), ..Default::default() };
     let sun = Light { map, shadows: ShadowMethod::Map, ..noon() };
