@@ -260,6 +260,16 @@ pub(crate) struct Link {
     /// Allow connections from other machines without encryption
     #[arg(long, conflicts_with = "certificates")]
     pub(crate) plain: bool,
+    /// A line without a sign of life for so many milliseconds is broken, and made anew
+    #[arg(long, default_value_t = umbriel_displays::cluster::LEASE.as_millis() as u64, value_parser = clap::value_parser!(u64).range(100..))]
+    pub(crate) lease_ms: u64,
+}
+
+#[cfg(feature = "cluster")]
+impl Link {
+    pub(crate) fn lease(&self) -> std::time::Duration {
+        std::time::Duration::from_millis(self.lease_ms)
+    }
 }
 
 #[cfg(feature = "cluster")]

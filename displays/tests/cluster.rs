@@ -6,7 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
-use umbriel_displays::cluster::{ClusterError, Follower, Host, HostOptions, Screen, Security, make_certificates};
+use umbriel_displays::cluster::{
+    ClusterError, Follower, FollowerOptions, Host, HostOptions, LEASE, Screen, Security, make_certificates,
+};
 use umbriel_fields::Graph;
 use umbriel_scenegraph::{new_graph, node_types};
 
@@ -30,6 +32,11 @@ impl Screen for Seen {
     }
 }
 
+fn join(endpoint: &str, security: Security, name: &str) -> Result<Follower, ClusterError> {
+    let options = FollowerOptions { endpoint: endpoint.into(), security, lease: LEASE, ends_with_application: false };
+    Follower::connect(options, name, types())
+}
+
 fn types() -> Vec<umbriel_fields::NodeType> {
     node_types().into_iter().chain(umbriel_fields::builtin_types()).collect()
 }
@@ -51,7 +58,7 @@ fn serve(endpoint: &str, security: Security, end: &AtomicBool) -> Host {
     let mut graph = new_graph();
     let turner = graph.create("Transform").unwrap();
     graph.set_name(turner, "turner").unwrap();
-    let options = HostOptions { listen: endpoint.into(), security, timeout: Duration::from_millis(500) };
+    let options = HostOptions { listen: endpoint.into(), security, timeout: Duration::from_millis(500), lease: LEASE };
     let mut host = Host::listen(&options).unwrap();
     let mut frame = 0;
     while !end.load(Ordering::Relaxed) {
@@ -84,11 +91,11 @@ fn displays_follow_come_late_and_outlive_the_application() {
     let endpoint = format!("tcp/127.0.0.1:{}", free_port());
     let (first_end, second_end) = (AtomicBool::new(false), AtomicBool::new(false));
     std::thread::scope(|scope| {
-        let mut early = Follower::connect(&endpoint, &Security::Loopback, "early", types()).unwrap();
+        let mut early = join(&endpoint, Security::Loopback, "early").unwrap();
         let first = scope.spawn(|| serve(&endpoint, Security::Loopback, &first_end));
         let mut seen = Seen::default();
         assert!(follow(&mut early, &mut seen, |seen| seen.shown.len() > 5).unwrap());
-        let mut late = Follower::connect(&endpoint, &Security::Loopback, "late", types()).unwrap();
+        let mut late = join(&endpoint, Security::Loopback, "late").unwrap();
         let mut seen_late = Seen::default();
         let both = Instant::now();
         while seen_late.shown.len() < 5 && both.elapsed() < Duration::from_secs(10) {
@@ -98,7 +105,7 @@ fn displays_follow_come_late_and_outlive_the_application() {
         assert!(seen_late.shown.len() >= 5);
         assert!(seen.shown.iter().chain(&seen_late.shown).all(|(frame, x)| *x == *frame as f32), "{:?}", seen.shown);
         // Its name is taken.
-        let mut twin = Follower::connect(&endpoint, &Security::Loopback, "late", types()).unwrap();
+        let mut twin = join(&endpoint, Security::Loopback, "late").unwrap();
         let refused = follow(&mut twin, &mut Seen::default(), |_| false);
         assert!(matches!(&refused, Err(ClusterError::Refused(why)) if why.contains("`late`")), "{refused:?}");
         first_end.store(true, Ordering::Relaxed);
@@ -123,12 +130,12 @@ fn only_certificates_of_the_same_authority_are_let_in() {
     let end = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let host = scope.spawn(|| serve(&endpoint, Security::Mutual(ours.clone()), &end));
-        let mut friend = Follower::connect(&endpoint, &Security::Mutual(ours.clone()), "friend", types()).unwrap();
+        let mut friend = join(&endpoint, Security::Mutual(ours.clone()), "friend").unwrap();
         let mut seen = Seen::default();
         let is_in = follow(&mut friend, &mut seen, |seen| seen.shown.len() > 3).unwrap();
         let mut strangers = [
-            Follower::connect(&endpoint, &Security::Mutual(foreign), "foreign", types()).unwrap(),
-            Follower::connect(&format!("tcp/127.0.0.1:{port}"), &Security::Loopback, "plain", types()).unwrap(),
+            join(&endpoint, Security::Mutual(foreign), "foreign").unwrap(),
+            join(&format!("tcp/127.0.0.1:{port}"), Security::Loopback, "plain").unwrap(),
         ];
         for stranger in &mut strangers {
             stranger.run(&mut Seen::default(), Duration::from_millis(1500)).unwrap();
@@ -146,7 +153,7 @@ fn events_of_displays_reach_the_application_in_order() {
     let end = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let host = scope.spawn(|| serve(&endpoint, Security::Loopback, &end));
-        let mut display = Follower::connect(&endpoint, &Security::Loopback, "wall", types()).unwrap();
+        let mut display = join(&endpoint, Security::Loopback, "wall").unwrap();
         let mut seen = Seen::default();
         assert!(follow(&mut display, &mut seen, |seen| seen.shown.len() > 3).unwrap());
         for _ in 0..20 {

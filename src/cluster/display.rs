@@ -4,7 +4,7 @@ use super::screen::Canvas;
 use super::{Failure, security};
 use crate::cli;
 use std::time::{Duration, Instant};
-use umbriel_displays::cluster::{ClusterError, Follower};
+use umbriel_displays::cluster::{ClusterError, Follower, FollowerOptions};
 use umbriel_fields::{NodeType, TypeRegistry, builtin_types};
 
 /// How long a display that ends with its application waits for the first word of it.
@@ -14,8 +14,13 @@ const PATIENCE_S: u64 = 60;
 pub(crate) fn display(args: &cli::Display) -> Result<usize, Failure> {
     let types: Vec<NodeType> = umbriel_scenegraph::node_types().into_iter().chain(builtin_types()).collect();
     let mut canvas = Canvas::new(&args.show, &args.assets, args.out.as_deref())?;
-    let mut follower = Follower::connect(&args.connect, &security(&args.link), &args.show, TypeRegistry::from(types))?;
-    follower.ends_with_application = args.once;
+    let options = FollowerOptions {
+        endpoint: args.connect.clone(),
+        security: security(&args.link),
+        lease: args.link.lease(),
+        ends_with_application: args.once,
+    };
+    let mut follower = Follower::connect(options, &args.show, TypeRegistry::from(types))?;
     let started = Instant::now();
     let mut corrupt_after = args.corrupt;
     while !follower.is_over() {

@@ -15,6 +15,7 @@ pub(crate) fn serve(args: &cli::Serve) -> Result<usize, Failure> {
         listen: args.listen.clone(),
         security: security(&args.link),
         timeout: Duration::from_millis(args.timeout_ms),
+        lease: args.link.lease(),
     };
     let mut host = Host::listen(&options)?;
     let mut desk = Desk::open(&host, &session.name())?;

@@ -29,6 +29,19 @@ pub trait Screen {
     fn show(&mut self, frame: u64) -> Result<(), Self::Error>;
 }
 
+/// How an application is found.
+#[derive(Clone, Debug)]
+pub struct FollowerOptions {
+    /// Its address, such as `tcp/127.0.0.1:7447`.
+    pub endpoint: String,
+    /// How links are protected.
+    pub security: Security,
+    /// A link without a sign of life for so long is broken: see [`LEASE`](super::LEASE).
+    pub lease: Duration,
+    /// Ends with the application, instead of waiting for it to come back.
+    pub ends_with_application: bool,
+}
+
 /// What happened to a display.
 #[derive(Clone, Debug, Default)]
 pub struct FollowerReport {
@@ -80,9 +93,14 @@ pub struct Follower {
     started: Instant,
     last_shown: Option<Instant>,
     refused_since: Option<Instant>,
-    /// Ends when the application does, instead of waiting for it to come back.
-    pub ends_with_application: bool,
+    ends_with_application: bool,
+    /// Since when there is no link to an application.
+    alone_since: Option<Instant>,
     is_over: bool,
+    /// For the last drawing.
+    took: Duration,
+    /// Of the replica as it was drawn last; by now it may be further.
+    drawn_hash: u64,
     report: FollowerReport,
     _held: (Vec<Subscriber<()>>, LivelinessToken),
 }
@@ -93,17 +111,14 @@ fn network(error: zenoh::Error) -> ClusterError {
 
 /// A display that crashed and comes back at once finds its own name taken until its old link is given up.
 const NAME_IS_FREE_AFTER: Duration = Duration::from_secs(4);
+/// A link that broke looks like an application that ended; after so long it did.
+const APPLICATION_ENDED_AFTER: Duration = Duration::from_secs(5);
 
 impl Follower {
-    /// Joins the application at an address, now or as soon as it is there. `name` is that of the display; `types` are those that can
+    /// Joins the application, now or as soon as it is there. `name` is that of the display; `types` are those that can
     /// be drawn.
-    pub fn connect(
-        endpoint: &str,
-        security: &Security,
-        name: &str,
-        types: impl Into<TypeRegistry>,
-    ) -> Result<Follower, ClusterError> {
-        let session = open(endpoint, security, End::Display)?;
+    pub fn connect(options: FollowerOptions, name: &str, types: impl Into<TypeRegistry>) -> Result<Follower, ClusterError> {
+        let session = open(&options.endpoint, &options.security, End::Display, options.lease)?;
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
         let number = since ^ (std::process::id() as u64) << 40;
         let (sender, arrived) = unbounded();
@@ -146,8 +161,11 @@ impl Follower {
             started: Instant::now(),
             last_shown: None,
             refused_since: None,
-            ends_with_application: false,
+            ends_with_application: options.ends_with_application,
+            alone_since: None,
             is_over: false,
+            took: Duration::ZERO,
+            drawn_hash: 0,
             report: FollowerReport::default(),
             _held: (subscribers, token),
         })
@@ -188,8 +206,13 @@ impl Follower {
             let left = until.saturating_duration_since(Instant::now());
             if let Ok(arrived) = self.arrived.recv_timeout(left.min(Duration::from_millis(5))) {
                 self.handle(arrived, screen)?;
+                while let Ok(arrived) = self.arrived.try_recv() {
+                    self.handle(arrived, screen)?;
+                }
             }
             self.step(DisplayEvent::Tick, screen)?;
+            let is_alone = self.alone_since.is_some_and(|since| since.elapsed() > APPLICATION_ENDED_AFTER);
+            self.is_over |= self.ends_with_application && is_alone;
             if left.is_zero() || self.is_over {
                 return Ok(());
             }
@@ -255,9 +278,11 @@ impl Follower {
                 // What waits for it is of the past: a snapshot knows what is needed now.
                 self.parked.clear();
             }
-            Arrived::Application(true) => {}
-            Arrived::Application(false) if self.ends_with_application => self.is_over = true,
-            Arrived::Application(false) => tracing::warn!("the application is gone; waiting for it to come back"),
+            Arrived::Application(true) => self.alone_since = None,
+            Arrived::Application(false) => {
+                tracing::warn!("display `{}`: the application is gone; waiting for it to come back", self.name);
+                self.alone_since = Some(Instant::now());
+            }
         }
         self.unpark(screen)
     }
@@ -320,15 +345,20 @@ impl Follower {
                     }
                     DisplayAction::Apply(frame) => events.push_back(self.apply(frame)?),
                     DisplayAction::Draw(frame) => {
+                        let began = Instant::now();
                         if let Some(replica) = &self.replica {
+                            self.drawn_hash = replica.hash();
                             screen.draw(replica.graph(), frame, std::mem::take(&mut self.is_new))?;
                         }
+                        self.took = began.elapsed();
+                        tracing::debug!("display `{}` drew frame {frame} in {:.1?}", self.name, self.took);
                         events.push_back(DisplayEvent::Drawn(frame));
                     }
                     DisplayAction::Ready(frame) => {
-                        let hash = self.replica.as_ref().map_or(0, Replica::hash);
+                        let hash = self.drawn_hash;
                         let name = self.name.clone();
-                        let ready = Ready { display: self.number, name, epoch: self.lock.epoch(), frame, hash };
+                        let (epoch, took_us) = (self.lock.epoch(), self.took.as_micros() as u64);
+                        let ready = Ready { display: self.number, name, epoch, frame, took_us, hash };
                         if let Err(error) = self.ready.put(bytes_of(&ready)).wait() {
                             tracing::debug!("cannot say ready: {error}");
                         }

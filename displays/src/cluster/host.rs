@@ -30,6 +30,8 @@ pub struct HostOptions {
     pub security: Security,
     /// How long a frame waits for a display.
     pub timeout: Duration,
+    /// A link without a sign of life for so long is broken: see [`LEASE`](super::LEASE).
+    pub lease: Duration,
 }
 
 /// What happened since the start.
@@ -108,7 +110,7 @@ fn network(error: zenoh::Error) -> ClusterError {
 impl Host {
     /// Listens.
     pub fn listen(options: &HostOptions) -> Result<Host, ClusterError> {
-        let session = open(&options.listen, &options.security, End::Application)?;
+        let session = open(&options.listen, &options.security, End::Application, options.lease)?;
         let (sender, arrived) = unbounded();
         let (replies, to_reply) = unbounded::<Answer>();
         // Long answers to slow displays must not hold up frames.
@@ -311,7 +313,8 @@ impl Host {
             return tracing::error!("display `{name}` is ready with frame {}, but its values differ", ready.frame);
         }
         self.report.agreed += is_known.is_some() as u64;
-        self.steps(ApplicationEvent::Ready(DisplayId(ready.display), ready.frame));
+        let display = DisplayId(ready.display);
+        self.steps(ApplicationEvent::Ready { display, frame: ready.frame, took_us: ready.took_us });
     }
 
     fn joins(&mut self, graph: &Graph, query: Query) {

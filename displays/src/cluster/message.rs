@@ -7,7 +7,7 @@ use umbriel_fields::replica::Deed;
 use super::transport::ClusterError;
 
 /// Spoken by both ends; another one is refused.
-pub(super) const PROTOCOL: u16 = 1;
+pub(super) const PROTOCOL: u16 = 2;
 
 pub(super) const FRAME: &str = "umbriel/frame";
 pub(super) const RELEASE: &str = "umbriel/release";
@@ -94,6 +94,8 @@ pub(super) struct Ready {
     pub(super) name: String,
     pub(super) epoch: u64,
     pub(super) frame: u64,
+    /// How long it took to draw it.
+    pub(super) took_us: u64,
     /// Of its replica.
     pub(super) hash: u64,
 }

@@ -23,11 +23,11 @@ mod transport;
 #[cfg(feature = "cluster")]
 pub use self::{
     certificates::make as make_certificates,
-    follower::{Follower, FollowerReport, Screen},
+    follower::{Follower, FollowerOptions, FollowerReport, Screen},
     host::{Host, HostOptions, HostReport},
     message::Input,
     proxy::Proxy,
-    transport::{ClusterError, Security},
+    transport::{ClusterError, LEASE, Security},
 };
 #[cfg(feature = "cluster")]
 pub use guests::{Desk, Guest, News, Whose, Wish};

@@ -2,6 +2,7 @@
 
 use std::net::{IpAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use zenoh::{Config, Session, Wait};
 
@@ -129,15 +130,21 @@ fn files(folder: &Path, end: End) -> Result<[String; 3], ClusterError> {
     Ok([authority?, certificate?, key?])
 }
 
+/// How long a link may give no sign of life before it counts as broken, and is made anew. Machines that are so busy that even this takes
+/// longer want more.
+pub const LEASE: Duration = Duration::from_secs(1);
+
 /// Settings that were measured: see `docs/performance.md`. Nobody is searched for, and nobody is told of others.
-pub(super) fn open(endpoint: &str, security: &Security, end: End) -> Result<Session, ClusterError> {
+pub(super) fn open(endpoint: &str, security: &Security, end: End, lease: Duration) -> Result<Session, ClusterError> {
     check(endpoint, security)?;
     let quoted = |text: &str| json_string(text);
     let mut rows: Vec<(&str, String)> = vec![
         ("mode", quoted("peer")),
         ("scouting/multicast/enabled", "false".into()),
         ("scouting/gossip/enabled", "false".into()),
-        ("transport/link/tx/lease", "1000".into()),
+        ("transport/link/tx/lease", lease.as_millis().to_string()),
+        // A try while the line is cut is given up soon, so that the next one finds it mended.
+        ("transport/unicast/open_timeout", "1000".into()),
         ("transport/link/tx/queue/size/data", "16".into()),
         ("transport/link/tx/queue/congestion_control/block/wait_before_close", "200000".into()),
         ("transport/shared_memory/enabled", "false".into()),

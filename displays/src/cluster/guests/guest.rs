@@ -18,7 +18,7 @@ use crate::cluster::message::{
     bytes_of, message_of, unstamped,
 };
 use crate::cluster::transport::{End, open};
-use crate::cluster::{ClusterError, Security};
+use crate::cluster::{ClusterError, LEASE, Security};
 
 /// What is not confirmed after so long is sent again.
 const RESEND: Duration = Duration::from_millis(500);
@@ -123,7 +123,7 @@ impl Guest {
         keeps: bool,
         fresh: fn() -> Graph,
     ) -> Result<Guest, ClusterError> {
-        let session = open(endpoint, security, End::Display)?;
+        let session = open(endpoint, security, End::Display, LEASE)?;
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
         let id = since ^ (std::process::id() as u64) << 40;
         let (sender, arrived) = unbounded();

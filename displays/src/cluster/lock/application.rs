@@ -18,7 +18,14 @@ pub enum ApplicationEvent {
     /// The next frame was evaluated and sent. Only after the release of the last one.
     Published(u64),
     /// A display has drawn a frame and waits to show it.
-    Ready(DisplayId, u64),
+    Ready {
+        /// The display.
+        display: DisplayId,
+        /// What it has drawn.
+        frame: u64,
+        /// How long it took for that.
+        took_us: TimeUs,
+    },
     /// A display left, or its connection broke.
     Gone(DisplayId),
     /// Time went on; at least every few milliseconds while a frame waits.
@@ -41,11 +48,25 @@ struct Member {
     is_live: bool,
     /// The last frame that it was ready with.
     ready: u64,
+    /// When it became so, and how long it took to draw.
+    ready_us: TimeUs,
+    took_us: TimeUs,
     heard_us: TimeUs,
     /// Not waited for before this time.
     rests_until_us: TimeUs,
     rest_us: TimeUs,
     good_frames: u32,
+}
+
+impl Member {
+    /// Draws well within a time.
+    fn is_fast(&self, within_us: TimeUs) -> bool {
+        3 * self.took_us < 2 * within_us
+    }
+
+    fn may_come_in(&self, now_us: TimeUs) -> bool {
+        !self.is_live && now_us >= self.rests_until_us
+    }
 }
 
 /// Who is waited for, and since when.
@@ -89,36 +110,53 @@ impl ApplicationLock {
         let mut actions = Vec::new();
         match event {
             ApplicationEvent::Published(frame) => {
-                (self.frame, self.published_us) = (frame, now_us);
-                let rested = |member: &Member| !member.is_live && now_us >= member.rests_until_us && member.ready > 0;
-                for (id, member) in self.members.iter_mut().filter(|(_, member)| rested(member)) {
-                    // Who was heard long ago is not worth waiting for.
-                    if now_us < member.heard_us + self.timeout_us {
+                let before_us = std::mem::replace(&mut self.published_us, now_us);
+                self.frame = frame;
+                for (id, member) in &mut self.members {
+                    // It became ready since the last frame, so that it idles now: what is released already it does not draw.
+                    let had_last = member.ready + 1 == frame && member.took_us < self.timeout_us;
+                    let is_in_step = had_last || member.is_fast(self.timeout_us);
+                    if member.may_come_in(now_us) && member.ready_us >= before_us && is_in_step {
                         member.is_live = true;
                         actions.push(ApplicationAction::Admitted(*id));
                     }
                 }
             }
-            ApplicationEvent::Ready(id, frame) => {
-                let member = self.members.entry(id).or_insert(Member {
-                    is_live: false,
-                    ready: 0,
-                    heard_us: now_us,
-                    rests_until_us: 0,
-                    rest_us: FIRST_REST_US,
-                    good_frames: 0,
-                });
-                member.heard_us = now_us;
-                // A frame of the future is one of another run of the application.
-                if frame <= self.frame {
-                    member.ready = member.ready.max(frame);
-                }
-            }
+            ApplicationEvent::Ready { display, frame, took_us } => self.ready(now_us, display, frame, took_us, &mut actions),
             ApplicationEvent::Gone(id) => drop(self.members.remove(&id)),
-            ApplicationEvent::Tick => self.members.retain(|_, member| now_us < member.heard_us + FORGOTTEN_US),
+            ApplicationEvent::Tick => {
+                self.members.retain(|_, member| now_us < member.heard_us + FORGOTTEN_US.max(4 * self.timeout_us))
+            }
         }
         self.release(now_us, &mut actions);
         actions
+    }
+
+    fn ready(&mut self, now_us: TimeUs, id: DisplayId, frame: u64, took_us: TimeUs, actions: &mut Vec<ApplicationAction>) {
+        let (is_waiting, current) = (self.waits(), self.frame);
+        let member = self.members.entry(id).or_insert(Member {
+            is_live: false,
+            ready: 0,
+            ready_us: now_us,
+            took_us: 0,
+            heard_us: now_us,
+            rests_until_us: 0,
+            rest_us: FIRST_REST_US,
+            good_frames: 0,
+        });
+        member.heard_us = now_us;
+        // A frame of the future is one of another run of the application; what is said again is no news.
+        if frame > current || frame <= member.ready {
+            return;
+        }
+        (member.ready, member.ready_us, member.took_us) = (frame, now_us, took_us);
+        // The others take their time for the last frame, and it turns to that too. If it will be in time, it is waited for.
+        let spent_us = now_us - self.published_us;
+        if is_waiting && frame < current && member.is_fast(self.timeout_us.saturating_sub(spent_us)) && member.may_come_in(now_us)
+        {
+            member.is_live = true;
+            actions.push(ApplicationAction::Admitted(id));
+        }
     }
 
     fn release(&mut self, now_us: TimeUs, actions: &mut Vec<ApplicationAction>) {

@@ -45,7 +45,8 @@ pub enum DisplayEvent {
     Diverged(u64),
     /// The frame was drawn.
     Drawn(u64),
-    /// Time went on; at least every few milliseconds.
+    /// Nothing more has come for now; at least every few milliseconds. Only then is anything drawn: what came during a long drawing would
+    /// otherwise be drawn one by one, for ever behind the others.
     Tick,
 }
 
@@ -79,9 +80,15 @@ pub struct DisplayLock {
     drawing: Option<u64>,
     drawn: u64,
     shown: u64,
+    /// The last frame that the application let others show. Earlier ones are not worth drawing, except to be warm.
+    released: u64,
+    /// Nothing was drawn since the last snapshot: pipelines, meshes and textures are not on the GPU yet.
+    is_cold: bool,
     /// When a snapshot was last asked for, while one is needed.
     fetching_since_us: Option<TimeUs>,
     missing_since_us: Option<TimeUs>,
+    /// Since when a frame could be drawn, but for the last one, which is not known to be released.
+    held_since_us: Option<TimeUs>,
     said_ready_us: TimeUs,
 }
 
@@ -122,12 +129,14 @@ impl DisplayLock {
             DisplayEvent::Snapshot { epoch, frame } if self.is_current(epoch, &mut actions) => {
                 if self.applied.is_none() {
                     (self.applied, self.fetching_since_us) = (Some(frame), None);
+                    self.is_cold = true;
                     actions.push(DisplayAction::Restore(frame));
                     self.waiting = self.waiting.split_off(&(frame + 1));
                 }
                 self.advance(now_us, &mut actions);
             }
             DisplayEvent::Release { epoch, frame, is_mine } if self.is_current(epoch, &mut actions) => {
+                self.released = self.released.max(frame);
                 if is_mine && self.drawn == frame && self.shown < frame {
                     self.shown = frame;
                     actions.push(DisplayAction::Show(frame));
@@ -151,6 +160,7 @@ impl DisplayLock {
                 // What was drawn for another run of the application is worth nothing.
                 if self.drawing == Some(frame) {
                     self.drawing = None;
+                    self.is_cold = false;
                     self.drawn = frame;
                     self.say_ready(now_us, &mut actions);
                 }
@@ -161,6 +171,7 @@ impl DisplayLock {
                     self.say_ready(now_us, &mut actions);
                 }
                 self.advance(now_us, &mut actions);
+                self.draw(now_us, &mut actions);
             }
         }
         actions
@@ -199,22 +210,38 @@ impl DisplayLock {
                 self.waiting.remove(&frame);
                 self.missing_since_us = None;
                 self.is_applying = true;
-                return actions.push(DisplayAction::Apply(frame));
+                actions.push(DisplayAction::Apply(frame));
             }
             Some(_) => {
                 let since = *self.missing_since_us.get_or_insert(now_us);
                 if now_us >= since + PATIENCE_US {
                     self.missing_since_us = None;
                     self.applied = None;
-                    return self.fetch(now_us, actions);
+                    self.fetch(now_us, actions);
                 }
             }
             None => self.missing_since_us = None,
         }
-        if applied > self.drawn {
-            self.drawing = Some(applied);
-            actions.push(DisplayAction::Draw(applied));
+    }
+
+    /// Draws the newest frame, unless the others are done with it.
+    fn draw(&mut self, now_us: TimeUs, actions: &mut Vec<DisplayAction>) {
+        let Some(applied) = self.applied.filter(|_| !self.is_applying && self.drawing.is_none()) else { return };
+        let has_next = self.waiting.first() == Some(&(applied + 1));
+        let is_wanted = applied > self.drawn && (self.is_cold || applied > self.released);
+        if has_next || !is_wanted {
+            return;
         }
+        // The release of what waits to be shown may have been overtaken by the next frame.
+        if self.drawn > self.shown.max(self.released) {
+            let since = *self.held_since_us.get_or_insert(now_us);
+            if now_us < since + PATIENCE_US {
+                return;
+            }
+        }
+        self.held_since_us = None;
+        self.drawing = Some(applied);
+        actions.push(DisplayAction::Draw(applied));
     }
 
     fn fetch(&mut self, now_us: TimeUs, actions: &mut Vec<DisplayAction>) {

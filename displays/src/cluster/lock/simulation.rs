@@ -43,7 +43,7 @@ enum Message {
     Frame { epoch: u64, frame: u64, world: u64 },
     Release { epoch: u64, frame: u64, may_show: Vec<DisplayId> },
     Snapshot { epoch: u64, frame: u64, world: u64 },
-    Ready { epoch: u64, frame: u64 },
+    Ready { epoch: u64, frame: u64, took_us: TimeUs },
     Fetch,
     Gone,
     Drawn(u64),
@@ -60,6 +60,9 @@ struct Display {
     packets: BTreeMap<u64, (u64, u64)>,
     snapshot: u64,
     drawn: (u64, u64),
+    /// Nothing was drawn since the last snapshot.
+    is_cold: bool,
+    took_us: TimeUs,
     /// Drawing or frozen until then; messages wait.
     busy_until_us: TimeUs,
     inbox: VecDeque<Message>,
@@ -75,6 +78,8 @@ impl Display {
             packets: BTreeMap::new(),
             snapshot: 0,
             drawn: (0, 0),
+            is_cold: true,
+            took_us: 0,
             busy_until_us: 0,
             inbox: VecDeque::new(),
             is_cut_off: false,
@@ -89,6 +94,15 @@ struct Faults {
     repeated: u64,
     longest_us: u64,
     disasters: bool,
+}
+
+/// How fast displays draw.
+#[derive(Clone, Copy, Debug)]
+struct Pace {
+    /// The first frame after a snapshot takes once to twice this: pipelines are compiled, meshes go to the GPU.
+    first_us: TimeUs,
+    /// Each other one half to one and a half times this.
+    each_us: TimeUs,
 }
 
 #[derive(Default, Debug)]
@@ -106,6 +120,7 @@ struct Tally {
 struct Simulation {
     dice: Dice,
     faults: Faults,
+    pace: Pace,
     now_us: TimeUs,
     queue: BinaryHeap<Reverse<(TimeUs, u64)>>,
     messages: BTreeMap<u64, (Address, DisplayId, Message)>,
@@ -121,10 +136,11 @@ struct Simulation {
 }
 
 impl Simulation {
-    fn new(seed: u64, displays: usize, faults: Faults) -> Self {
+    fn new(seed: u64, displays: usize, faults: Faults, pace: Pace) -> Self {
         let mut simulation = Self {
             dice: Dice(seed),
             faults,
+            pace,
             now_us: 0,
             queue: BinaryHeap::new(),
             messages: BTreeMap::new(),
@@ -196,8 +212,8 @@ impl Simulation {
                 self.application_steps(ApplicationEvent::Tick);
             }
             _ if is_down => {}
-            Message::Ready { epoch, frame } if epoch == self.epoch => {
-                self.application_steps(ApplicationEvent::Ready(from, frame))
+            Message::Ready { epoch, frame, took_us } if epoch == self.epoch => {
+                self.application_steps(ApplicationEvent::Ready { display: from, frame, took_us })
             }
             Message::Gone => self.application_steps(ApplicationEvent::Gone(from)),
             Message::Fetch => {
@@ -264,6 +280,9 @@ impl Simulation {
         {
             self.display_handles(place, message);
         }
+        if self.now_us >= self.displays[place].busy_until_us {
+            self.display_handles(place, Message::Tick);
+        }
     }
 
     fn display_handles(&mut self, place: usize, message: Message) {
@@ -311,6 +330,7 @@ impl Simulation {
                 }
                 DisplayAction::Restore(frame) => {
                     display.world = display.snapshot;
+                    display.is_cold = true;
                     display.packets = display.packets.split_off(&(frame + 1));
                 }
                 DisplayAction::Apply(frame) => {
@@ -322,13 +342,20 @@ impl Simulation {
                     self.display_steps(place, if agrees { DisplayEvent::Applied(frame) } else { DisplayEvent::Diverged(frame) });
                 }
                 DisplayAction::Draw(frame) => {
-                    let draws_us = 500 + self.dice.below(9_000);
+                    let draws_us = match std::mem::take(&mut display.is_cold) {
+                        true => self.pace.first_us + self.dice.below(self.pace.first_us),
+                        false => self.pace.each_us / 2 + self.dice.below(self.pace.each_us),
+                    };
                     let display = &mut self.displays[place];
+                    display.took_us = draws_us;
                     display.busy_until_us = self.now_us + draws_us;
                     let id = display.id;
                     self.at(draws_us, Some(place), id, Message::Drawn(frame));
                 }
-                DisplayAction::Ready(frame) => self.send(place, None, Message::Ready { epoch, frame }),
+                DisplayAction::Ready(frame) => {
+                    let took_us = display.took_us;
+                    self.send(place, None, Message::Ready { epoch, frame, took_us });
+                }
                 DisplayAction::Show(frame) => {
                     assert!(display.drawn >= (epoch, frame));
                     self.tally.shown += 1;
@@ -391,14 +418,17 @@ impl Simulation {
         // What was lost before shows within the timeout.
         self.run_until(awake_us + 2 * TIMEOUT_US);
         self.now_us = awake_us + 2 * TIMEOUT_US;
-        while self.now_us < awake_us + 2_000_000 && !self.all_show() {
+        // A first drawing that was under way, then one after the snapshot.
+        let patience_us = 4 * self.pace.first_us + 2_000_000;
+        while self.now_us < awake_us + patience_us && !self.all_show() {
             let next_us = self.now_us + TICK_US;
             self.run_until(next_us);
             self.now_us = next_us;
         }
         self.tally.longest_rejoin_us = self.tally.longest_rejoin_us.max(self.now_us - awake_us);
-        let end_us = self.now_us + 500_000;
+        let (end_us, drops) = (self.now_us + 1_000_000, self.tally.drops);
         self.run_until(end_us);
+        assert_eq!(self.tally.drops, drops, "who came back is in the lock for good");
         for (place, display) in self.displays.iter().enumerate() {
             let (shown, frame) = (display.lock.shown(), self.application.frame());
             assert!(self.all_show(), "display {place} shows {shown} of {frame}: {:?} {:?}", display.lock, self.application);
@@ -422,7 +452,11 @@ fn run(seed: u64) -> Tally {
         disasters: dice.below(4) > 0,
     };
     let displays = 1 + dice.below(7) as usize;
-    let mut simulation = Simulation::new(seed, displays, faults);
+    let pace = Pace {
+        first_us: [1_000, 150_000, 1_000_000][dice.below(3) as usize],
+        each_us: [1_000, 9_000, 80_000][dice.below(3) as usize],
+    };
+    let mut simulation = Simulation::new(seed, displays, faults, pace);
     simulation.run_until(4_000_000);
     simulation.now_us = 4_000_000;
     simulation.heal();
