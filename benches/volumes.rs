@@ -27,7 +27,13 @@ fn main() -> Outcome<()> {
     let gpu = Gpu::new(None)?;
     println!("{}", gpu.info.name);
     let (scene, pictures) = world("harbour")?;
-    let plain = VolumeSettings { counting: VolumeCounting::ZFail, culling: false, fitted: false, ..VolumeSettings::default() };
+    let plain = VolumeSettings {
+        counting: VolumeCounting::ZFail,
+        culling: false,
+        fitted: false,
+        depth_bounds: false,
+        ..VolumeSettings::default()
+    };
     let rows: Vec<Row> = vec![
         ("z-fail, nothing left out", with(&scene, ShadowMethod::Volume, plain)),
         ("z-fail, culled", with(&scene, ShadowMethod::Volume, VolumeSettings { culling: true, ..plain })),
@@ -40,6 +46,10 @@ fn main() -> Outcome<()> {
         (
             "automatic, degenerate quads",
             with(&scene, ShadowMethod::Volume, VolumeSettings { silhouettes: Silhouettes::Quads, ..VolumeSettings::default() }),
+        ),
+        (
+            "automatic, without depth bounds",
+            with(&scene, ShadowMethod::Volume, VolumeSettings { depth_bounds: false, ..VolumeSettings::default() }),
         ),
         ("map of 2048", with(&scene, ShadowMethod::Map, plain)),
         ("no shadows", with(&scene, ShadowMethod::None, plain)),

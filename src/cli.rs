@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use umbriel_scene::Samples;
 
 /// A dataflow field-container VR framework: scripted worlds, shadows, and every view of an installation.
 ///
@@ -100,6 +101,12 @@ pub(crate) struct Run {
     /// File to write; where there are several frames or displays, their number and name are put before `.png`
     #[arg(long, requires = "headless")]
     pub(crate) out: Option<PathBuf>,
+    /// Samples per pixel, instead of what the world's Environment says: 1 or 4
+    #[arg(long, value_parser = samples)]
+    pub(crate) samples: Option<Samples>,
+    /// Write no pictures, but tell how many frames per second were drawn, and what a frame took
+    #[arg(long, requires = "headless", conflicts_with_all = ["out", "record", "shadow_of"])]
+    pub(crate) measure: bool,
     /// Record the session to this file, for `replay` and `explain`
     #[arg(long)]
     pub(crate) record: Option<PathBuf>,
@@ -179,6 +186,10 @@ pub(crate) struct ShadowError {
     /// tracing
     #[arg(long)]
     pub(crate) truth: Option<PathBuf>,
+    /// Score so many places of the eye along a path through the casters and their shadows, and print the worst; pictures are
+    /// then 160x120 unless --size says otherwise
+    #[arg(long, value_name = "PLACES", conflicts_with_all = ["truth", "trace_only", "diff", "penumbra"])]
+    pub(crate) eyes: Option<u32>,
     /// Score this mask against the truth instead of rendering: the tracer against another's
     #[arg(long, conflicts_with = "method")]
     pub(crate) trace_only: bool,
@@ -439,6 +450,10 @@ pub(crate) enum Method {
     Map,
     /// Stencil shadow volumes
     Volume,
+}
+
+fn samples(text: &str) -> Result<Samples, String> {
+    text.parse().ok().and_then(Samples::of).ok_or_else(|| "1 or 4 samples".to_owned())
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {

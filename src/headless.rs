@@ -5,6 +5,7 @@ use crate::png;
 use crate::session::Session;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use umbriel_displays::WindowSizes;
 use umbriel_render::{FrameStats, Gpu, MapShare, Renderer};
 use umbriel_scene::{Picture, PictureKind};
@@ -16,7 +17,10 @@ pub(crate) const DESKTOP_SIZE: [u32; 2] = [1280, 720];
 
 /// Draws the frames that were asked for. Gives the number of problems that were reported meanwhile.
 pub(crate) fn run(args: &Run) -> Result<usize, Failure> {
-    let mut session = Session::open(&args.path)?.wait_for_casters();
+    let mut session = Session::open(&args.path)?.wait_for_casters().with_samples(args.samples);
+    if args.measure {
+        return measure(&mut session, args);
+    }
     if let Some(file) = &args.record {
         session.record(file)?;
     }
@@ -36,6 +40,45 @@ pub(crate) fn run(args: &Run) -> Result<usize, Failure> {
     }
     println!("{} pictures, the last {}", drawn.pictures, drawn.last.display());
     Ok(drawn.problems)
+}
+
+/// Draws frames that nobody keeps, each of them done before the next begins, and tells how long they took. The first one, which
+/// makes what all need, does not count where there are more.
+fn measure(session: &mut Session, args: &Run) -> Result<usize, Failure> {
+    let gpu = Gpu::new(None)?;
+    let mut renderer = Renderer::new(&gpu)?;
+    let (mut frames_s, mut parts_s, mut problems) = (Vec::new(), [0.0; 3], 0);
+    for frame in 0..args.frames + u32::from(args.frames > 1) {
+        let start = Instant::now();
+        session.step(args.time + f64::from(frame) / args.fps);
+        let pictures = pictures(session, args.view.as_deref(), args.size)?;
+        let stepped = start.elapsed().as_secs_f64();
+        let stats = renderer.render(session.scene(), &pictures)?;
+        renderer.wait()?;
+        if frame > 0 || args.frames == 1 {
+            frames_s.push(start.elapsed().as_secs_f64());
+            let parts = [stepped, stats.prepare_s, stats.encode_s];
+            parts_s.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+        }
+        for problem in session.problems().into_iter().chain(renderer.problems()) {
+            tracing::error!("{problem}");
+            problems += 1;
+        }
+    }
+    let count = frames_s.len() as f64;
+    let whole: f64 = frames_s.iter().sum();
+    frames_s.sort_by(f64::total_cmp);
+    let [step, prepare, record] = parts_s.map(|part| 1e3 * part / count);
+    println!(
+        "{:.1} frames per second on {}: {count} frames, fastest {:.2} ms, median {:.2}, slowest {:.2}",
+        count / whole,
+        describe(&gpu),
+        1e3 * frames_s[0],
+        1e3 * frames_s[frames_s.len() / 2],
+        1e3 * frames_s[frames_s.len() - 1],
+    );
+    println!("of a frame: world and views {step:.2} ms, renderer's lists {prepare:.2}, recording {record:.2}, the rest drawing");
+    Ok(problems)
 }
 
 /// What is drawn, and where to.

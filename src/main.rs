@@ -4,6 +4,7 @@ mod cli;
 #[cfg(feature = "cluster")]
 mod cluster;
 mod doctor;
+mod eye_path;
 mod headless;
 mod model;
 mod nodes;

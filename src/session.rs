@@ -8,7 +8,7 @@ use umbriel_displays::WindowSizes;
 use umbriel_displays::navigation::{Input, NavigationNode};
 use umbriel_displays::rig::{Rig, Wanted};
 use umbriel_fields::{Graph, NodeId};
-use umbriel_scene::{Aabb, Picture, Scene};
+use umbriel_scene::{Aabb, Picture, Samples, Scene};
 use umbriel_scenegraph::{Extractor, Viewpoint};
 use umbriel_scripts::World;
 
@@ -40,6 +40,8 @@ pub(crate) struct Session {
     generation: u64,
     /// Frames wait until reduced casters are made.
     waits: bool,
+    /// Instead of what the world says.
+    samples: Option<Samples>,
     navigation: Option<NavigationNode>,
     /// What was reported and not yet told.
     problems: Vec<String>,
@@ -72,6 +74,7 @@ impl Session {
             path: path.to_path_buf(),
             generation: source.generation(),
             waits: false,
+            samples: None,
             source,
             recording: None,
             extractor: extractor_beside(path, false),
@@ -88,6 +91,11 @@ impl Session {
         self.waits = true;
         self.extractor = extractor_beside(&self.path, true);
         self
+    }
+
+    /// Draws with so many samples, whatever the world says.
+    pub(crate) fn with_samples(self, samples: Option<Samples>) -> Session {
+        Session { samples, ..self }
     }
 
     /// Records every frame from now on.
@@ -137,6 +145,7 @@ impl Session {
             self.rig.refit();
         }
         self.extractor.update(self.source.graph(), &mut self.scene);
+        self.scene.samples = self.samples.unwrap_or(self.scene.samples);
         let problems = self.extractor.problems();
         self.problems.extend(problems.iter().map(|problem| placed(&self.source, Some(problem.node), problem)));
     }

@@ -1,6 +1,7 @@
 //! Scores the shadows of one light against ray-traced ones (S13).
 
 use crate::cli::{Method, ShadowError};
+use crate::eye_path;
 use crate::headless::{describe, progress};
 use crate::png;
 use crate::scene_file::{self, SceneFile};
@@ -17,12 +18,12 @@ type Failure = Box<dyn std::error::Error>;
 const SIZE: [u32; 2] = [800, 600];
 
 /// What is scored.
-struct Subject {
-    scene: Scene,
-    light: usize,
-    view: View,
-    options: TraceOptions,
-    problems: Vec<String>,
+pub(crate) struct Subject {
+    pub(crate) scene: Scene,
+    pub(crate) light: usize,
+    pub(crate) view: View,
+    pub(crate) options: TraceOptions,
+    pub(crate) problems: Vec<String>,
 }
 
 /// Renders, traces, and prints the score; gives the number of problems that were reported.
@@ -42,6 +43,14 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
         return Err(format!("{shown}: it casts no shadows; choose a --method").into());
     }
 
+    if let Some(places) = args.eyes {
+        if args.size.is_none() {
+            subject.view.size = eye_path::SIZE;
+        }
+        println!("{shown}, {places} places, {}x{}", subject.view.size[0], subject.view.size[1]);
+        println!("{}", eye_path::score(&mut subject, places)?);
+        return Ok(subject.problems.len());
+    }
     let truth = match &args.truth {
         Some(path) => read_mask(path, subject.view.size)?,
         None => trace(&subject)?,

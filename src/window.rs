@@ -12,7 +12,7 @@ use umbriel_render::RgbaPixels;
 
 /// Opens the windows and runs until they are closed.
 pub(crate) fn run(args: &Run) -> Result<(), Box<dyn std::error::Error>> {
-    let mut session = Session::open(&args.path)?;
+    let mut session = Session::open(&args.path)?.with_samples(args.samples);
     if let Some(file) = &args.record {
         session.record(file)?;
     }

@@ -36,11 +36,16 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
     let truncated = folder("command").join("truncated.glb");
     std::fs::write(&truncated, b"glTF\x02\0\0\0\xff\0\0\0").expect("a file can be written");
     // Name, line of the world, what the message must contain. The rest of the world is drawn.
-    let rows: [(&str, &str, &[&str]); 25] = [
+    let rows: [(&str, &str, &[&str]); 26] = [
         (
             "negative_soft_range",
             r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "volume", soft: "range", soft_range: -1.0 }));"#,
             &["sun", "soft_range"],
+        ),
+        (
+            "three_samples",
+            r#"world.add(make("Environment", #{ name: "air", samples: 3 }));"#,
+            &["three_samples.rhai:4:11", "air", "samples: 3 is neither 1 nor 4"],
         ),
         ("missing_model", r#"world.add(load("nowhere.glb"));"#, &["nowhere.glb", "missing_model.rhai:4"]),
         ("truncated_model", r#"world.add(load("truncated.glb"));"#, &["truncated.glb", "truncated_model.rhai:4"]),

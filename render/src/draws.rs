@@ -15,6 +15,17 @@ pub(crate) struct Kind {
     pub(crate) double_sided: bool,
     /// Of the author; see [`crate::author`].
     pub(crate) shader: u32,
+    pub(crate) needs: Needs,
+}
+
+/// What of the surface shader a material needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Needs {
+    /// A bit for each of its textures.
+    pub(crate) textures: u8,
+    pub(crate) layers: u8,
+    /// Number of its shading, as in the uniform.
+    pub(crate) shading: u8,
 }
 
 /// What alpha means, without its numbers.
@@ -98,7 +109,8 @@ const NOTHING: u32 = u32::MAX;
 impl Draws {
     /// Starts a frame with room for `count` drawables.
     pub(crate) fn begin(&mut self, count: usize) {
-        let kind = Kind { alpha: Alpha::Opaque, topology: 0, mirrored: false, double_sided: false, shader: 0 };
+        let kind =
+            Kind { alpha: Alpha::Opaque, topology: 0, mirrored: false, double_sided: false, shader: 0, needs: Needs::default() };
         let slot = Slot { mesh: NOTHING, material: NOTHING, kind, deformed: None, drawn: false, casts: false };
         if self.slots.len() != count {
             self.is_sorted = false;
@@ -158,6 +170,7 @@ impl Draws {
             mirrored: instance.flags & Instance::MIRRORED != 0,
             double_sided: gpu_material.double_sided,
             shader: gpu_material.shader,
+            needs: gpu_material.needs,
         };
         let same = slot.drawn && (slot.mesh, slot.material, slot.deformed, slot.kind) == (mesh, material, deformed, kind);
         self.is_sorted &= same;
@@ -206,6 +219,20 @@ impl Draws {
             }
         }
         (draws, culled)
+    }
+
+    /// Drawables that a view may see and that pass `wanted`, each with a draw of its own.
+    pub(crate) fn single(&mut self, planes: &Planes, wanted: impl Fn(usize) -> bool) -> Vec<(usize, Draw)> {
+        let mut found = Vec::new();
+        for (number, batch) in (0u32..).zip(&self.batches) {
+            for (_, index) in &self.order[batch.first as usize..(batch.first + batch.count) as usize] {
+                if wanted(*index as usize) && planes.may_see(&self.boxes[*index as usize]) {
+                    found.push((*index as usize, Draw { batch: number, first: self.visible.len() as u32, count: 1 }));
+                    self.visible.push(*index);
+                }
+            }
+        }
+        found
     }
 
     /// Numbers of the drawables of one draw.

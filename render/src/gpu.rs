@@ -7,8 +7,6 @@ use std::sync::{Arc, Mutex};
 pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32FloatStencil8;
 /// Linear picture of a view before it is encoded.
 pub(crate) const LINEAR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-/// Samples per pixel of a view.
-pub(crate) const SAMPLES: u32 = 4;
 
 /// A device that can draw, and what led to it.
 #[derive(Clone)]
@@ -30,7 +28,11 @@ pub struct Gpu {
 impl Gpu {
     /// An instance to make the surface of a window with, for [`Gpu::new`].
     pub fn instance() -> wgpu::Instance {
-        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+        // Indirect draws are checked by a compute pass before every render pass, one dispatch for each buffer. All of ours
+        // are written by our own shaders into buffers that are made for the most that these can count.
+        descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
+        wgpu::Instance::new(descriptor)
     }
 
     /// Finds the fastest device that can draw, software last. For windows give the instance and a surface that it made.
@@ -97,7 +99,9 @@ fn open(instance: &wgpu::Instance, adapter: wgpu::Adapter) -> Result<Gpu, Error>
     if !missing.is_empty() {
         return Err(Error::Lacks { device: info.name, what: format!("{missing:?}") });
     }
-    let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::DEPTH_CLIP_CONTROL;
+    // Software waits for all of a pass to read its clock, which takes a part of the frame.
+    let clock = if info.device_type == wgpu::DeviceType::Cpu { wgpu::Features::empty() } else { wgpu::Features::TIMESTAMP_QUERY };
+    let wanted = clock | wgpu::Features::DEPTH_CLIP_CONTROL;
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("umbriel"),
         required_features: Gpu::required_features() | (adapter.features() & wanted),

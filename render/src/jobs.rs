@@ -8,9 +8,9 @@ use crate::plan::{BLACK_FILM, Purpose};
 use crate::slots::Slots;
 use crate::stats::Problems;
 use crate::uniforms;
-use crate::volumes::{Cone, Surface, VolumeCaster, VolumeJob, VolumeLight};
-use glam::{Vec3, Vec4};
-use umbriel_scene::{Aabb, AlphaMode, Light, LightKind, Mesh, Scene, ShadowMethod, StencilMode};
+use crate::volumes::{Cone, Seen, Surface, VolumeCaster, VolumeJob, VolumeLight};
+use glam::{Mat4, Vec3, Vec4};
+use umbriel_scene::{Aabb, AlphaMode, Light, LightKind, Mesh, Scene, ShadowMethod, StencilMode, Topology};
 
 /// All jobs of the frame and what each is for. Films are added to `films`.
 pub(crate) fn jobs(
@@ -94,6 +94,34 @@ pub(crate) fn receivers(drawables: impl Iterator<Item = usize>, scene: &Scene) -
     }
     all
 }
+
+/// What is known of the surfaces that a view shows; none where a receiver has no bounds.
+pub(crate) fn seen(drawables: impl Iterator<Item = usize>, scene: &Scene, view_from_world: &Mat4) -> Option<Seen> {
+    let eye = view_from_world.inverse().w_axis.truncate();
+    let mut seen = Seen::default();
+    for index in drawables {
+        let d = &scene.drawables[index];
+        if d.receives_shadow && d.material.alpha != AlphaMode::Blend {
+            if d.bounds_in_world.is_empty() {
+                return None;
+            }
+            seen.receivers.push(d.bounds_in_world);
+        }
+        let is_whole = d.material.alpha == AlphaMode::Opaque && d.material.shader.is_none() && d.pose.is_none();
+        if is_whole && d.mesh.topology == Topology::Triangles && d.mesh.triangle_count() <= MOST_HIDING {
+            let front = if d.world_from_object.determinant() < 0.0 { -1.0 } else { 1.0 };
+            seen.hiding.extend(d.mesh.indices.chunks_exact(3).filter_map(|t| {
+                let [a, b, c] = [0, 1, 2].map(|i| d.world_from_object.transform_point3(d.mesh.positions[t[i] as usize]));
+                let is_seen = front * (b - a).cross(c - a).dot(eye - a) > 0.0;
+                (d.material.double_sided || is_seen).then_some([a, b, c])
+            }));
+        }
+    }
+    Some(seen)
+}
+
+/// Triangles of a mesh whose triangles are looked at one by one for what they hide: walls, quays, grounds.
+const MOST_HIDING: usize = 64;
 
 fn caster(
     scene: &Scene,

@@ -3,6 +3,7 @@
 use crate::cull::Planes;
 use crate::draws::{Alpha, Draw, Draws};
 use crate::lights::{Lights, falls_on};
+use crate::sheets::Sheets;
 use crate::slots::Slots;
 use crate::soft::SoftJob;
 use crate::stats::{FrameStats, Problems};
@@ -11,7 +12,7 @@ use crate::volumes::Sight;
 use crate::{jobs, uniforms};
 use glam::{Mat4, Vec3};
 use std::collections::HashMap;
-use umbriel_scene::{Layout, Picture, PictureKind, Rect, Scene, View};
+use umbriel_scene::{Layout, Picture, PictureKind, Rect, Samples, Scene, View};
 
 /// One view of one picture.
 pub(crate) struct ViewPlan {
@@ -22,9 +23,15 @@ pub(crate) struct ViewPlan {
     /// Place in the pipelines of composition: all channels, red, green and blue.
     pub(crate) channels: usize,
     pub(crate) size: [u32; 2],
+    /// Left and top in its sheet.
+    pub(crate) origin: [u32; 2],
     pub(crate) is_visibility: bool,
     pub(crate) base_slot: usize,
+    /// Where shapes are shaded once, after depth and the first light's volumes: the view with that light among the others.
+    pub(crate) lit_slot: Option<usize>,
     pub(crate) opaque: Vec<Draw>,
+    /// Shapes with lines over their edges.
+    pub(crate) contoured: Vec<(usize, Draw)>,
     pub(crate) blend_slot: usize,
     pub(crate) blended: Vec<Draw>,
     /// What shadow volumes are chosen by.
@@ -81,6 +88,8 @@ pub(crate) struct Frame<'a> {
     pub(crate) purposes: &'a [Purpose],
     /// The soft ones among them.
     pub(crate) soft: &'a [Option<SoftJob>],
+    /// Shapes with lines over their edges, ascending.
+    pub(crate) contours: &'a [usize],
 }
 
 impl ViewPlan {
@@ -135,7 +144,7 @@ pub(crate) fn plan_picture(
     picture: &Picture,
     frame: &Frame<'_>,
     draws: &mut Draws,
-    slots: &mut Slots<uniforms::View>,
+    (slots, sheets): (&mut Slots<uniforms::View>, &mut Sheets),
     problems: &mut Problems,
     stats: &mut FrameStats,
     limit: u32,
@@ -160,10 +169,18 @@ pub(crate) fn plan_picture(
         let is_visibility = picture.kind != PictureKind::Colour;
         let (blended, blended_outside) =
             if is_visibility { (Vec::new(), 0) } else { draws.back_to_front(&planes, &view.view_from_world) };
+        let contoured = if is_visibility || frame.contours.is_empty() {
+            Vec::new()
+        } else {
+            draws.single(&planes, |index| frame.contours.binary_search(&index).is_ok() && is_seen(index as u32))
+        };
         stats.culled += (outside + blended_outside) as u32;
         stats.views += 1;
         let mut exempt_from = Exempt { scene: frame.scene, planes: &planes, is_seen: &is_seen, known: HashMap::new() };
-        let mut uniform = uniform_of(view, rect, frame.scene.exposure);
+        // Soft shadows read their view's pixels by their place.
+        let origin = sheets.place(view.size, frame.soft.iter().any(Option::is_some), limit);
+        let mut uniform = uniform_of(view, rect, frame.scene);
+        uniform.window = [origin[0], origin[1], view.size[0], view.size[1]].map(|x| x as f32);
         let mut slot_with = |first: usize, count: usize| {
             uniform.first_light = first as u32;
             uniform.light_count = count as u32;
@@ -185,23 +202,34 @@ pub(crate) fn plan_picture(
             steps.push(Step { job, soft, exempt: exempt_from.light(draws, purpose.light(frame.lights)), then });
         }
         let seen = opaque.iter().flat_map(|d| draws.visible_of(d)).map(|i| *i as usize);
-        let sight = Sight::new(view, jobs::receivers(seen, frame.scene));
+        let mut sight = Sight::new(view, jobs::receivers(seen.clone(), frame.scene)).at(origin);
+        if !steps.is_empty()
+            && let Some(surfaces) = jobs::seen(seen, frame.scene, &view.view_from_world)
+        {
+            sight = sight.with(surfaces);
+        }
         let in_base = match shown {
             Some(place) => usize::from(place < frame.lights.in_surface_pass),
             None if is_visibility => 0,
             None => frame.lights.in_surface_pass,
         };
+        // Behind the lights of the surface pass follows the first one that volumes mask.
+        let shades_once =
+            !is_visibility && steps.first().is_some_and(|s: &Step| s.soft.is_none() && matches!(s.then, Then::Light { .. }));
         plans.push(ViewPlan {
             picture: number,
             layer,
             rect,
             channels,
             size: view.size,
+            origin,
             is_visibility,
             base_slot: slot_with(0, in_base),
+            lit_slot: shades_once.then(|| slot_with(0, in_base + 1)),
             blend_slot: slot_with(0, frame.lights.order.len()),
             opaque,
             blended,
+            contoured,
             sight,
             shading_shadow: Vec::new(),
             steps,
@@ -257,7 +285,7 @@ fn what_is_wrong(view: &View, limit: u32) -> Option<String> {
     None
 }
 
-fn uniform_of(view: &View, rect: Rect, exposure: f32) -> uniforms::View {
+fn uniform_of(view: &View, rect: Rect, scene: &Scene) -> uniforms::View {
     let clip_from_world: Mat4 = view.frustum.clip_from_view() * view.view_from_world;
     let eye = view.view_from_world.inverse().transform_point3(Vec3::ZERO);
     uniforms::View {
@@ -266,9 +294,16 @@ fn uniform_of(view: &View, rect: Rect, exposure: f32) -> uniforms::View {
         view_from_world: view.view_from_world.to_cols_array_2d(),
         eye_in_world: eye.extend(1.0).to_array(),
         viewport: [rect.x as f32, rect.y as f32, rect.width as f32, rect.height as f32],
+        window: [0.0; 4],
         first_light: 0,
         light_count: 0,
-        exposure,
+        exposure: scene.exposure,
         shown_light: 0,
+        first_sample: match scene.samples {
+            Samples::One => [0.0; 2],
+            // The standard sample locations of Vulkan, Metal and Direct3D.
+            Samples::Four => [-0.125, -0.375],
+        },
+        spare: [0; 2],
     }
 }

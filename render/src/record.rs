@@ -2,10 +2,11 @@
 
 use crate::cache::{GpuMaterial, GpuMesh, Slab};
 use crate::clock::Clock;
+use crate::contours::Contours;
 use crate::deform::Deformer;
 use crate::draws::{Batch, Draw, Kind};
 use crate::maps::Maps;
-use crate::plan::{Step, Then, ViewPlan};
+use crate::plan::{BLACK_FILM, Step, Then, ViewPlan};
 use crate::screen::Screen;
 use crate::slots::Slots;
 use crate::soft::{SoftPass, SoftTarget};
@@ -79,6 +80,7 @@ pub(crate) struct Recorder<'a> {
     pub(crate) device: &'a wgpu::Device,
     pub(crate) volumes: &'a VolumePass,
     pub(crate) soft: &'a SoftPass,
+    pub(crate) contours: &'a Contours,
     pub(crate) views: &'a Slots<uniforms::View>,
     pub(crate) films: &'a Slots<uniforms::Film>,
     pub(crate) lighting: Option<&'a wgpu::BindGroup>,
@@ -96,73 +98,119 @@ impl Recorder<'_> {
         });
     }
 
-    /// One view: surfaces, then light and films by shadow volumes, then what is half-transparent.
-    pub(crate) fn view(&mut self, encoder: &mut wgpu::CommandEncoder, view: &ViewPlan, to: &ViewTarget) {
-        // The stencil starts empty, so the first volumes may be counted in the pass that filled depth.
-        let joins = |number: usize| number == 0 && view.steps[0].soft.is_none();
-        let is_last = view.steps.is_empty() || joins(0) && view.steps.len() == 1;
-        let mut pass = begin_view(encoder, self.clock, "surfaces", to, Part { is_first: true, is_last, keeps_stencil: false });
+    /// All views of a sheet, each of them surfaces, then light and films by shadow volumes, then what is half-transparent.
+    pub(crate) fn sheet(&mut self, encoder: &mut wgpu::CommandEncoder, views: &[ViewPlan], to: &ViewTarget) {
+        let is_soft = |view: &ViewPlan| view.steps.iter().any(|step| step.soft.is_some());
+        if let [view] = views
+            && is_soft(view)
+        {
+            return self.soft_view(encoder, view, to);
+        }
+        let mut pass = begin_part(encoder, self.clock, "views", to, Part { is_first: true, is_last: true, keeps_stencil: false });
+        for view in views {
+            let ([left, top], [width, height]) = (view.origin, view.size);
+            pass.set_viewport(left as f32, top as f32, width as f32, height as f32, 0.0, 1.0);
+            pass.set_scissor_rect(left, top, width, height);
+            self.depth_and_base(&mut pass, view);
+            for (number, step) in view.steps.iter().enumerate() {
+                if number > 0 {
+                    pass.set_stencil_reference(0);
+                    fill_stencil(&mut pass, self.screen, self.films.group(BLACK_FILM));
+                }
+                self.hard_step(&mut pass, view, step, number == 0);
+            }
+            self.blend(&mut pass, view);
+        }
+    }
+
+    /// One view with soft shadows, which read in a pass what one before it counted.
+    fn soft_view(&mut self, encoder: &mut wgpu::CommandEncoder, view: &ViewPlan, to: &ViewTarget) {
+        let part = |is_last| Part { is_first: false, is_last, keeps_stencil: false };
+        let mut pass = begin_part(encoder, self.clock, "surfaces", to, Part { is_first: true, ..part(false) });
+        self.depth_and_base(&mut pass, view);
+        for (number, step) in view.steps.iter().enumerate() {
+            let is_last = number + 1 == view.steps.len();
+            if let (Some(layers), Some(soft)) = (&step.soft, &to.soft) {
+                drop(pass);
+                pass = self.soft_step(encoder, view, (step, layers), (to, soft), part(is_last));
+                continue;
+            }
+            // The stencil starts empty, so the first volumes may be counted in the pass that filled depth.
+            if number > 0 {
+                drop(pass);
+                pass = begin_part(encoder, self.clock, "shadow volumes", to, part(is_last));
+            }
+            self.hard_step(&mut pass, view, step, number == 0);
+        }
+        self.blend(&mut pass, view);
+    }
+
+    /// Depth, and whatever is seen where no volume is needed for it.
+    fn depth_and_base(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan) {
         pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
-        self.surfaces(&mut pass, &view.opaque, view.base_pass());
+        self.surfaces(pass, &view.opaque, if view.lit_slot.is_some() { Pass::Depth } else { view.base_pass() });
         if !view.is_visibility {
             pass.set_pipeline(&self.screen.background);
             pass.set_bind_group(3, self.lighting, &[]);
             pass.draw(0..3, 0..1);
         }
-        for (number, step) in view.steps.iter().enumerate() {
-            let is_last = number + 1 == view.steps.len();
-            if joins(number) {
-                self.count(&mut pass, view, (step.job, &step.exempt));
-                self.use_counts(&mut pass, view, &step.then);
-                continue;
-            }
-            drop(pass);
-            if let (Some(layers), Some(soft)) = (&step.soft, &to.soft) {
-                pass = self.soft_step(encoder, view, (step, layers), (to, soft), is_last);
-                continue;
-            }
-            pass = self.counted(
-                encoder,
-                view,
-                (step.job, &step.exempt),
-                to,
-                Part { is_first: false, is_last, keeps_stencil: false },
-            );
-            self.use_counts(&mut pass, view, &step.then);
+    }
+
+    /// Counts volumes into the empty stencil and uses the counts.
+    fn hard_step(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, step: &Step, is_first: bool) {
+        let is_counted = self.count(pass, view, (step.job, &step.exempt));
+        let shades = is_first && view.lit_slot.is_some();
+        if shades {
+            self.shade_once(pass, view, is_counted);
         }
+        self.use_counts(pass, view, &step.then, shades);
+    }
+
+    /// Lines over edges, and what is half-transparent.
+    fn blend(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan) {
+        let base = self.views.group(view.base_slot);
+        let contours = self.contours;
+        let screen = self.screen;
+        let film = self.films.group(BLACK_FILM);
+        let empty = |pass: &mut wgpu::RenderPass<'_>| fill_stencil(pass, screen, film);
+        contours.draw(pass, base, &view.contoured, empty, |pass, draw| {
+            pass.set_bind_group(0, base, &[]);
+            self.surfaces(pass, &[*draw], Pass::Mark);
+        });
         pass.set_bind_group(0, self.views.group(view.blend_slot), &[]);
-        self.surfaces(&mut pass, &view.blended, Pass::Blend);
+        self.surfaces(pass, &view.blended, Pass::Blend);
     }
 
-    /// A pass whose stencil holds the counts of a job's volumes.
-    fn counted<'e>(
-        &mut self,
-        encoder: &'e mut wgpu::CommandEncoder,
-        view: &ViewPlan,
-        (job, exempt): (usize, &[Draw]),
-        to: &ViewTarget,
-        part: Part,
-    ) -> wgpu::RenderPass<'e> {
-        let mut pass = begin_view(encoder, self.clock, "shadow volumes", to, part);
-        self.count(&mut pass, view, (job, exempt));
-        pass
-    }
-
-    /// Counts the volumes of a job, and forgets them where shapes receive no shadow.
-    fn count(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, (job, exempt): (usize, &[Draw])) {
+    /// Counts the volumes of a job, and forgets them where shapes receive no shadow. False where there is none to count.
+    fn count(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, (job, exempt): (usize, &[Draw])) -> bool {
         let drawn = self.volumes.draw(pass, job, self.views.group(view.base_slot), &view.sight);
+        let is_counted = drawn.z_pass + drawn.z_fail > 0;
         self.stats.volumes.add(&drawn);
         pass.set_stencil_reference(0);
         pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
         self.surfaces(pass, exempt, Pass::Exempt);
+        is_counted
     }
 
-    /// Adds light outside of what was counted, or lays a film inside.
-    fn use_counts(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, then: &Then) {
+    /// Shades what depth holds, each place once: with the counted light outside of its shadow, without it inside.
+    fn shade_once(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, is_counted: bool) {
+        let Some(lit_slot) = view.lit_slot else { return };
+        pass.set_bind_group(0, self.views.group(lit_slot), &[]);
+        self.surfaces(pass, &view.opaque, Pass::BaseLit);
+        if is_counted {
+            pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
+            self.surfaces(pass, &view.opaque, Pass::BaseInShadow);
+        }
+    }
+
+    /// Adds light outside of what was counted, unless it `is_added` already, or lays a film inside.
+    fn use_counts(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, then: &Then, is_added: bool) {
         match *then {
             Then::Light { slot } => {
                 pass.set_bind_group(0, self.views.group(slot), &[]);
-                self.surfaces(pass, &view.opaque, view.add_pass(false));
+                if !is_added {
+                    self.surfaces(pass, &view.opaque, view.add_pass(false));
+                }
                 self.surfaces(pass, &view.shading_shadow, Pass::AddInShadow);
             }
             Then::Film { slot } => {
@@ -181,25 +229,22 @@ impl Recorder<'_> {
         view: &ViewPlan,
         (step, layers): (&Step, &[usize]),
         (to, soft): (&ViewTarget, &SoftTarget),
-        is_last: bool,
+        last: Part,
     ) -> wgpu::RenderPass<'e> {
         for (number, &job) in layers.iter().enumerate() {
-            drop(self.counted(
-                encoder,
-                view,
-                (job, &step.exempt),
-                to,
-                Part { is_first: false, is_last: false, keeps_stencil: true },
-            ));
+            let part = Part { is_last: false, keeps_stencil: true, ..last };
+            let mut pass = begin_part(encoder, self.clock, "shadow volumes", to, part);
+            self.count(&mut pass, view, (job, &step.exempt));
+            drop(pass);
             self.soft.draw(self.device, encoder, self.clock, (job, self.views.group(view.base_slot)), (soft, number == 0));
         }
         let slot = if let Then::Light { slot } = step.then { slot } else { view.base_slot };
         let soft_view = self.soft.passes.view_group(self.device, self.views.binding(slot), soft);
         if let Then::Film { slot } = step.then {
             let groups = (&soft_view, self.films.group(slot));
-            self.soft.passes.film(self.device, encoder, self.clock, groups, (soft, &to.samples));
+            self.soft.passes.film(self.device, encoder, self.clock, groups, (soft, to.colour()));
         }
-        let mut pass = begin_view(encoder, self.clock, "soft light", to, Part { is_first: false, is_last, keeps_stencil: false });
+        let mut pass = begin_part(encoder, self.clock, "soft light", to, last);
         if let Then::Light { .. } = step.then {
             pass.set_bind_group(0, &soft_view, &[]);
             self.surfaces(&mut pass, &view.opaque, view.add_pass(true));
@@ -216,24 +261,28 @@ impl Recorder<'_> {
         });
     }
 
-    /// Brings a view to its place in its picture.
+    /// Brings views to their places in their picture.
     pub(crate) fn compose(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
-        view: &ViewPlan,
+        views: &[ViewPlan],
         from: &ViewTarget,
         to: &Layer,
         is_first: bool,
     ) {
+        let is_visibility = views[0].is_visibility;
         let (target, pipelines) =
-            if view.is_visibility { (&to.plain, &self.screen.plain) } else { (&to.encoding, &self.screen.exposed) };
+            if is_visibility { (&to.plain, &self.screen.plain) } else { (&to.encoding, &self.screen.exposed) };
         let mut pass = begin_colour(encoder, self.clock.render("compose"), target, is_first);
-        let r = view.rect;
-        pass.set_viewport(r.x as f32, r.y as f32, r.width as f32, r.height as f32, 0.0, 1.0);
-        pass.set_pipeline(&pipelines[view.channels]);
-        pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
         pass.set_bind_group(1, &from.group, &[]);
-        pass.draw(0..3, 0..1);
+        for view in views {
+            let r = view.rect;
+            pass.set_viewport(r.x as f32, r.y as f32, r.width as f32, r.height as f32, 0.0, 1.0);
+            pass.set_scissor_rect(r.x, r.y, r.width, r.height);
+            pass.set_pipeline(&pipelines[view.channels]);
+            pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
+            pass.draw(0..3, 0..1);
+        }
     }
 }
 
@@ -258,7 +307,15 @@ pub(crate) fn begin_colour<'e>(
     })
 }
 
-/// Place of a pass among those of a view.
+/// The view's part of the stencil becomes the reference. `any_film` is bound and not read.
+fn fill_stencil(pass: &mut wgpu::RenderPass<'_>, screen: &Screen, any_film: &wgpu::BindGroup) {
+    pass.set_pipeline(&screen.fill_stencil);
+    pass.set_bind_group(1, any_film, &[]);
+    pass.draw(0..3, 0..1);
+}
+
+/// Place of a pass among those of a sheet.
+#[derive(Clone, Copy)]
 struct Part {
     is_first: bool,
     is_last: bool,
@@ -266,8 +323,8 @@ struct Part {
     keeps_stencil: bool,
 }
 
-/// A pass into a view. The first fills depth, later ones read it and start with an empty stencil; the last resolves.
-fn begin_view<'e>(
+/// A pass into a sheet. The first fills depth, later ones read it and start with an empty stencil; the last resolves.
+fn begin_part<'e>(
     encoder: &'e mut wgpu::CommandEncoder,
     clock: &Clock,
     label: &'static str,
@@ -276,15 +333,17 @@ fn begin_view<'e>(
 ) -> wgpu::RenderPass<'e> {
     let kept = |is_kept| if is_kept { StoreOp::Store } else { StoreOp::Discard };
     let store = kept(!part.is_last);
+    let resolve_target = to.resolve_target().filter(|_| part.is_last);
+    let is_resolved = resolve_target.is_some();
     let load = if part.is_first { LoadOp::Clear(wgpu::Color::BLACK) } else { LoadOp::Load };
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some(label),
         timestamp_writes: clock.render(label),
         color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-            view: &to.samples,
+            view: to.colour(),
             depth_slice: None,
-            resolve_target: part.is_last.then_some(&to.resolved),
-            ops: Operations { load, store },
+            resolve_target,
+            ops: Operations { load, store: kept(!is_resolved) },
         })],
         depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
             view: &to.depth,

@@ -2,6 +2,7 @@
 
 use crate::cache::{GpuMaterial, GpuMesh, MaterialCache, Slab, make_mesh};
 use crate::clock::Clock;
+use crate::contours::Contours;
 use crate::deform::Deformer;
 use crate::draws::{Caches, Draw, Draws};
 use crate::layouts::Layouts;
@@ -13,15 +14,16 @@ use crate::projection::{self, ProjectionLists};
 use crate::read_back::{self, GreyPixels, RgbaPixels};
 use crate::record::{Drawer, Recorder};
 use crate::screen::Screen;
+use crate::sheets::Sheets;
 use crate::slots::Slots;
 use crate::soft::{self, SoftJob, SoftPass};
 use crate::stats::{FrameStats, Problems};
-use crate::surface::{Pass, Surface};
+use crate::surface::{FrameNeeds, Pass, Surface};
 use crate::targets::{Target, ViewTargets};
 use crate::volumes::{Depth, VolumeJob, VolumePass};
 use crate::{Error, Gpu, buffer::GrowBuffer, gpu, jobs, surroundings, uniforms};
 use std::time::Instant;
-use umbriel_scene::{Aabb, Material, Mesh, Picture, Scene};
+use umbriel_scene::{Aabb, Material, Mesh, Picture, Samples, Scene};
 
 /// Draws frames.
 pub struct Renderer {
@@ -32,6 +34,7 @@ pub struct Renderer {
     maps: Maps,
     volumes: VolumePass,
     soft: SoftPass,
+    contours: Contours,
     deformer: Deformer,
     meshes: Slab<Mesh, Option<GpuMesh>>,
     materials: Slab<Material, GpuMaterial>,
@@ -46,6 +49,7 @@ pub struct Renderer {
     problems: Problems,
     clock: Clock,
     frame: u64,
+    samples: Samples,
 }
 
 impl Renderer {
@@ -53,13 +57,14 @@ impl Renderer {
     pub fn new(gpu: &Gpu) -> Result<Renderer, Error> {
         let device = &gpu.device;
         let layouts = Layouts::new(device);
-        let linear = Some(gpu::LINEAR_FORMAT);
+        let samples = Samples::default();
         Ok(Renderer {
-            surface: Surface::new(device, &layouts),
-            screen: Screen::new(device, &layouts),
+            surface: Surface::new(device, &layouts, samples),
+            screen: Screen::new(device, &layouts, samples),
             maps: Maps::new(device, &layouts),
-            volumes: VolumePass::new(device, Depth::Reversed, gpu::DEPTH_FORMAT, gpu::SAMPLES, linear, &layouts.view),
-            soft: SoftPass::new(device, &layouts),
+            volumes: volume_pass(device, &layouts, samples),
+            soft: SoftPass::new(device, &layouts, samples),
+            contours: Contours::new(device, &layouts, samples),
             deformer: Deformer::new(device),
             meshes: Slab::default(),
             materials: Slab::default(),
@@ -74,6 +79,7 @@ impl Renderer {
             problems: Problems::default(),
             clock: Clock::new(device, &gpu.queue),
             frame: 0,
+            samples,
             layouts,
             gpu: gpu.clone(),
         })
@@ -86,19 +92,23 @@ impl Renderer {
         self.frame += 1;
         self.views.clear();
         self.films.clear();
+        self.take_samples(scene.samples);
         self.take_drawables(scene);
         let lights = Lights::new(scene);
         let casters = self.choose_maps(scene, pictures);
         let (mut jobs, purposes) =
             jobs::jobs(scene, &lights, &self.draws, &self.meshes, &self.deformer, &mut self.films, &mut self.problems);
         let soft = soft::soft_jobs(scene, &lights, &purposes, &mut jobs);
-        let plans =
-            self.plan_views(pictures, &plan::Frame { scene, lights: &lights, purposes: &purposes, soft: &soft }, &mut stats);
+        let seen = (&self.draws, &self.meshes, &self.deformer);
+        self.contours.prepare((&self.gpu.device, &self.gpu.queue), scene, seen, &mut self.volumes);
+        let contours = self.contours.places();
+        let frame = plan::Frame { scene, lights: &lights, purposes: &purposes, soft: &soft, contours: &contours };
+        let (plans, sheets) = self.plan_views(pictures, &frame, &mut stats);
         let lists = projection::lists(scene, pictures, &lights, &self.maps, casters);
         self.upload(scene, &lights, &lists);
         let prepared = Instant::now();
 
-        self.record(&plans, (&jobs, &soft), &mut stats);
+        self.record((&plans, &sheets), (&jobs, &soft), &mut stats);
         self.drop_unused();
         stats.maps = self.maps.faces.len() as u32;
         stats.map_shares.clone_from(&self.maps.shares);
@@ -106,6 +116,21 @@ impl Renderer {
         stats.prepare_s = (prepared - start).as_secs_f64();
         stats.encode_s = prepared.elapsed().as_secs_f64();
         Ok(stats)
+    }
+
+    /// Makes anew what depends on the number of samples.
+    fn take_samples(&mut self, samples: Samples) {
+        if self.samples == samples {
+            return;
+        }
+        let device = &self.gpu.device;
+        self.samples = samples;
+        self.surface.set_samples(samples);
+        self.screen = Screen::new(device, &self.layouts, samples);
+        self.volumes = volume_pass(device, &self.layouts, samples);
+        self.soft = SoftPass::new(device, &self.layouts, samples);
+        self.contours = Contours::new(device, &self.layouts, samples);
+        self.view_targets = ViewTargets::default();
     }
 
     /// Meshes, materials and places of everything that is drawn.
@@ -166,10 +191,12 @@ impl Renderer {
         around.casters
     }
 
-    fn plan_views(&mut self, pictures: &[Picture], frame: &plan::Frame<'_>, stats: &mut FrameStats) -> Vec<ViewPlan> {
+    fn plan_views(&mut self, pictures: &[Picture], frame: &plan::Frame<'_>, stats: &mut FrameStats) -> (Vec<ViewPlan>, Sheets) {
         let device = &self.gpu.device;
         let limit = device.limits().max_texture_dimension_2d;
-        let mut plans = Vec::new();
+        let has_fog = frame.scene.fog.is_some_and(|f| f.visibility_range > 0.0);
+        self.surface.set_frame(FrameNeeds { maps: !self.maps.faces.is_empty(), fog: has_fog });
+        let (mut plans, mut sheets) = (Vec::new(), Sheets::default());
         self.targets.resize_with(pictures.len(), || None);
         for (number, picture) in pictures.iter().enumerate() {
             if !plan::is_drawable(picture, limit, &mut self.problems) {
@@ -179,7 +206,7 @@ impl Renderer {
             if !self.targets[number].as_ref().is_some_and(|t| t.fits(picture)) {
                 self.targets[number] = Some(Target::new(device, &self.layouts.picture, picture));
             }
-            let (draws, views, problems) = (&mut self.draws, &mut self.views, &mut self.problems);
+            let (draws, views, problems) = (&mut self.draws, (&mut self.views, &mut sheets), &mut self.problems);
             plans.extend(plan::plan_picture(number, picture, frame, draws, views, problems, stats, limit));
         }
         for view in &mut plans {
@@ -187,13 +214,17 @@ impl Renderer {
                 let shader = |d: &&Draw| self.draws.batches[d.batch as usize].kind.shader;
                 view.shading_shadow = view.opaque.iter().filter(|d| self.surface.shades_shadow(shader(d))).copied().collect();
             }
-            let is_soft = view.steps.iter().any(|s| s.soft.is_some());
-            self.view_targets.make(device, &self.layouts.picture, view.size, is_soft, self.frame);
-            let mut passes = vec![(view.base_pass(), &view.opaque), (Pass::Blend, &view.blended)];
+            let mut passes = vec![(Pass::Blend, &view.blended)];
+            let shaded =
+                if view.lit_slot.is_some() { &[Pass::Depth, Pass::BaseLit, Pass::BaseInShadow][..] } else { &[view.base_pass()] };
+            passes.extend(shaded.iter().map(|pass| (*pass, &view.opaque)));
             if !view.steps.is_empty() {
                 passes.push((Pass::AddInShadow, &view.shading_shadow));
                 passes.extend(view.steps.iter().map(|step| (Pass::Exempt, &step.exempt)));
                 passes.extend(view.steps.iter().map(|s| (view.add_pass(s.soft.is_some()), &view.opaque)));
+            }
+            for (_, draw) in &view.contoured {
+                self.surface.make(device, Pass::Mark, self.draws.batches[draw.batch as usize].kind);
             }
             for (pass, list) in passes {
                 for draw in list {
@@ -201,7 +232,12 @@ impl Renderer {
                 }
             }
         }
-        plans
+        let mut rest = plans.iter();
+        for sheet in &sheets.0 {
+            let is_soft = rest.by_ref().take(sheet.views).flat_map(|view: &ViewPlan| &view.steps).any(|s| s.soft.is_some());
+            self.view_targets.make(device, &self.layouts.picture, sheet.size, (self.samples, is_soft), self.frame);
+        }
+        (plans, sheets)
     }
 
     /// Sends the frame's lists to the GPU.
@@ -214,7 +250,12 @@ impl Renderer {
     }
 
     /// Records and submits: deformation, volumes, maps, views.
-    fn record(&mut self, plans: &[ViewPlan], (jobs, soft): (&[VolumeJob], &[Option<SoftJob>]), stats: &mut FrameStats) {
+    fn record(
+        &mut self,
+        (plans, sheets): (&[ViewPlan], &Sheets),
+        (jobs, soft): (&[VolumeJob], &[Option<SoftJob>]),
+        stats: &mut FrameStats,
+    ) {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         stats.deformed = self.deformer.run(&mut encoder, &self.clock);
@@ -237,6 +278,7 @@ impl Renderer {
             device,
             volumes: &self.volumes,
             soft: &self.soft,
+            contours: &self.contours,
             views: &self.views,
             films: &self.films,
             lighting: self.lighting.group(),
@@ -245,11 +287,17 @@ impl Renderer {
         };
         recorder.maps(&mut encoder, &self.maps);
         let mut begun = std::collections::HashSet::new();
-        for view in plans {
-            if let (Some(from), Some(Some(to))) = (self.view_targets.get(view.size), self.targets.get(view.picture)) {
-                recorder.view(&mut encoder, view, from);
-                let is_first = begun.insert((view.picture, view.layer));
-                recorder.compose(&mut encoder, view, from, &to.layers[view.layer], is_first);
+        let mut rest = plans;
+        for sheet in &sheets.0 {
+            let (views, others) = rest.split_at(sheet.views);
+            rest = others;
+            let Some(target) = self.view_targets.get(sheet.size) else { continue };
+            recorder.sheet(&mut encoder, views, target);
+            for views in views.chunk_by(|a, b| (a.picture, a.layer) == (b.picture, b.layer)) {
+                let place = (views[0].picture, views[0].layer);
+                if let Some(Some(to)) = self.targets.get(place.0) {
+                    recorder.compose(&mut encoder, views, target, &to.layers[place.1], begun.insert(place));
+                }
             }
         }
         self.clock.resolve(&mut encoder);
@@ -280,6 +328,12 @@ impl Renderer {
     fn finished(&self, index: usize) -> Result<&Target, Error> {
         let count = self.targets.len();
         self.targets.get(index).and_then(|t| t.as_ref()).ok_or(Error::NoPicture { index, count })
+    }
+
+    /// Waits until the last frame is drawn.
+    pub fn wait(&self) -> Result<(), Error> {
+        let done = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+        done.map(drop).map_err(|e| Error::Device(e.to_string()))
     }
 
     /// Waits for the last frame and brings a picture back, layer by layer.
@@ -327,4 +381,9 @@ impl Renderer {
         }
         self.problems.drain()
     }
+}
+
+fn volume_pass(device: &wgpu::Device, layouts: &Layouts, samples: Samples) -> VolumePass {
+    let linear = Some(gpu::LINEAR_FORMAT);
+    VolumePass::new(device, Depth::Reversed, gpu::DEPTH_FORMAT, samples.count(), linear, &layouts.view)
 }

@@ -1,10 +1,12 @@
 //! Passes that cover the screen: background, film, composition.
 
-use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT, SAMPLES};
+use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT};
 use crate::layouts::Layouts;
 use crate::shaders;
+use crate::surface::replacing;
 use crate::targets::{PICTURE_FORMAT, PICTURE_FORMAT_SRGB};
 use std::collections::HashMap;
+use umbriel_scene::Samples;
 use wgpu::{ColorWrites, CompareFunction};
 
 /// Pipelines that need no vertices.
@@ -13,6 +15,8 @@ pub(crate) struct Screen {
     pub(crate) background: wgpu::RenderPipeline,
     /// On surfaces where the stencil is not 0.
     pub(crate) film: wgpu::RenderPipeline,
+    /// Sets the stencil to its reference.
+    pub(crate) fill_stencil: wgpu::RenderPipeline,
     /// Linear picture to its place: all channels, red, green and blue.
     pub(crate) exposed: [wgpu::RenderPipeline; 3],
     /// Visibility to its place.
@@ -27,7 +31,7 @@ pub(crate) struct Screen {
 const MASKS: [ColorWrites; 3] = [ColorWrites::ALL, ColorWrites::RED, ColorWrites::GREEN.union(ColorWrites::BLUE)];
 
 impl Screen {
-    pub(crate) fn new(device: &wgpu::Device, layouts: &Layouts) -> Screen {
+    pub(crate) fn new(device: &wgpu::Device, layouts: &Layouts, samples: Samples) -> Screen {
         let layout = |label, groups: &[Option<&wgpu::BindGroupLayout>]| {
             device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(label),
@@ -43,25 +47,30 @@ impl Screen {
         let stencil = wgpu::StencilState { front: in_shadow, back: in_shadow, read_mask: 0xff, write_mask: 0 };
         let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         let compose = |entry, format| {
-            MASKS.map(|mask| pipeline(device, &compose_layout, &compose_module, entry, (format, None, mask), None))
+            MASKS.map(|mask| pipeline(device, (&compose_layout, &compose_module), entry, (format, None, mask), None))
         };
         Screen {
             background: pipeline(
                 device,
-                &background_layout,
-                &shaders::module(device, "background", shaders::BACKGROUND),
+                (&background_layout, &shaders::module(device, "background", shaders::BACKGROUND)),
                 "background",
                 (LINEAR_FORMAT, None, ColorWrites::ALL),
-                Some((CompareFunction::Equal, wgpu::StencilState::default())),
+                Some((samples, CompareFunction::Equal, wgpu::StencilState::default())),
             ),
             film: pipeline(
                 device,
-                &film_layout,
-                &shaders::module(device, "film", shaders::FILM),
+                (&film_layout, &shaders::module(device, "film", shaders::FILM)),
                 "tint",
                 (LINEAR_FORMAT, over, ColorWrites::ALL),
                 // Depth of the film is 0, infinitely far: it passes where there is a surface.
-                Some((CompareFunction::Less, stencil)),
+                Some((samples, CompareFunction::Less, stencil)),
+            ),
+            fill_stencil: pipeline(
+                device,
+                (&film_layout, &shaders::module(device, "fill stencil", shaders::FILM)),
+                "tint",
+                (LINEAR_FORMAT, None, ColorWrites::empty()),
+                Some((samples, CompareFunction::Always, replacing())),
             ),
             exposed: compose("exposed", PICTURE_FORMAT_SRGB),
             plain: compose("plain", PICTURE_FORMAT),
@@ -75,20 +84,19 @@ impl Screen {
     pub(crate) fn blit(&mut self, device: &wgpu::Device, format: wgpu::TextureFormat) -> &wgpu::RenderPipeline {
         self.blits.entry(format).or_insert_with(|| {
             let target = (format, None, ColorWrites::ALL);
-            pipeline(device, &self.blit_layout, &self.compose_module, "plain", target, None)
+            pipeline(device, (&self.blit_layout, &self.compose_module), "shown", target, None)
         })
     }
 }
 
 fn pipeline(
     device: &wgpu::Device,
-    layout: &wgpu::PipelineLayout,
-    module: &wgpu::ShaderModule,
+    (layout, module): (&wgpu::PipelineLayout, &wgpu::ShaderModule),
     entry: &str,
     (format, blend, write_mask): (wgpu::TextureFormat, Option<wgpu::BlendState>, ColorWrites),
-    depth: Option<(CompareFunction, wgpu::StencilState)>,
+    over: Option<(Samples, CompareFunction, wgpu::StencilState)>,
 ) -> wgpu::RenderPipeline {
-    let count = if depth.is_some() { SAMPLES } else { 1 };
+    let count = over.as_ref().map_or(1, |(samples, ..)| samples.count());
     let compilation_options = wgpu::PipelineCompilationOptions::default();
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(entry),
@@ -100,7 +108,7 @@ fn pipeline(
             buffers: &[],
         },
         primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: depth.map(|(compare, stencil)| wgpu::DepthStencilState {
+        depth_stencil: over.map(|(_, compare, stencil)| wgpu::DepthStencilState {
             format: DEPTH_FORMAT,
             depth_write_enabled: Some(false),
             depth_compare: Some(compare),

@@ -1,5 +1,7 @@
 //! The shaders: each is a pass's own WGSL behind the snippets that it uses.
 
+use umbriel_scene::Samples;
+
 /// Name and parts of every shader but that of surfaces.
 #[cfg(test)]
 pub(crate) const ALL: &[(&str, &[&str])] = &[
@@ -9,10 +11,9 @@ pub(crate) const ALL: &[(&str, &[&str])] = &[
     ("maps", MAPS),
     ("deform", DEFORM),
     ("silhouettes", SILHOUETTES),
-    ("hard shadow", HARD_SHADOW),
+    ("contours", CONTOURS),
     ("wedges", WEDGES),
     ("penumbra", PENUMBRA),
-    ("soft film", SOFT_FILM),
 ];
 
 /// All that surfaces use, but the functions that a shape's own shader may replace ([`HOOKS`]) and what calls them.
@@ -69,6 +70,9 @@ pub(crate) const SILHOUETTES: &[&str] = &[
     include_str!("soft/silhouettes.wgsl"),
 ];
 
+pub(crate) const CONTOURS: &[&str] =
+    &[include_str!("shaders/view.wgsl"), include_str!("shaders/position.wgsl"), include_str!("contours/contours.wgsl")];
+
 pub(crate) const HARD_SHADOW: &[&str] = &[include_str!("shaders/fullscreen.wgsl"), include_str!("soft/hard.wgsl")];
 
 pub(crate) const WEDGES: &[&str] =
@@ -82,11 +86,21 @@ pub(crate) const PENUMBRA: &[&str] = &[
 ];
 
 pub(crate) const SOFT_FILM: &[&str] = &[
+    include_str!("shaders/view.wgsl"),
     include_str!("shaders/soft_shadow.wgsl"),
     include_str!("shaders/fullscreen.wgsl"),
     include_str!("film.wgsl"),
     include_str!("soft/film.wgsl"),
 ];
+
+/// A shader that reads the view's depth or stencil, for so many samples of them.
+pub(crate) fn of_samples(samples: Samples, parts: &[&str]) -> String {
+    let head = match samples {
+        Samples::One => include_str!("shaders/one_sample.wgsl"),
+        Samples::Four => include_str!("shaders/four_samples.wgsl"),
+    };
+    [head, &parts.concat()].concat()
+}
 
 /// Compiles the joined parts.
 pub(crate) fn module(device: &wgpu::Device, name: &str, parts: &[&str]) -> wgpu::ShaderModule {
@@ -99,7 +113,7 @@ pub(crate) fn module(device: &wgpu::Device, name: &str, parts: &[&str]) -> wgpu:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{deform, soft, uniforms};
+    use crate::{contours, deform, soft, uniforms};
     use naga::valid::{Capabilities, ValidationFlags, Validator};
     use std::mem::offset_of;
 
@@ -112,7 +126,10 @@ mod tests {
 
     fn all() -> Vec<(&'static str, String)> {
         let others = ALL.iter().map(|(name, parts)| (*name, parts.concat()));
-        others.chain([("surface", surface())]).collect()
+        let sampled = [("hard shadow", HARD_SHADOW), ("soft film", SOFT_FILM)]
+            .into_iter()
+            .flat_map(|(name, parts)| [Samples::One, Samples::Four].map(|samples| (name, of_samples(samples, parts))));
+        others.chain(sampled).chain([("surface", surface())]).collect()
     }
 
     #[test]
@@ -134,8 +151,8 @@ mod tests {
     #[test]
     fn structs_are_laid_out_alike() {
         for Ours(shader, name, size, fields) in [
-            ours!("surface", "View", uniforms::View, clip_from_world world_from_clip view_from_world eye_in_world viewport
-                first_light light_count exposure shown_light),
+            ours!("surface", "View", uniforms::View, clip_from_world world_from_clip view_from_world eye_in_world viewport window
+                first_light light_count exposure shown_light first_sample),
             ours!("surface", "Instance", uniforms::Instance, world_from_object world_from_object_normal flags),
             ours!("surface", "Texture", uniforms::Texture, linear offset uv_set present),
             ours!("surface", "Material", uniforms::Material, base_color emissive alpha_cutoff specular exponent metallic
@@ -147,6 +164,7 @@ mod tests {
             ours!("surface", "MapFace", uniforms::MapFace, map_from_world world_from_map tile light texel depth),
             ours!("surface", "Frame", uniforms::Frame, ambient zenith horizon nadir fog_color fog_range fog_kind light_count
                 receive_words world_from_room),
+            ours!("contours", "Contour", contours::Uniform, world_from_object color line_px outline_px crease_cos),
             ours!("film", "Film", uniforms::Film, color),
             ours!("penumbra", "Source", soft::Source, toward_light size),
             ours!("deform", "Deformation", deform::Uniform, vertex_count target_count joint_count),

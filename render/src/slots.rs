@@ -4,8 +4,8 @@ use crate::buffer::GrowBuffer;
 use bytemuck::Pod;
 use std::marker::PhantomData;
 
-/// Bytes from one uniform to the next: the greatest alignment that a device may ask for.
-const STRIDE: u64 = 256;
+/// The greatest alignment that a device may ask for, bytes.
+const ALIGNMENT: u64 = 256;
 
 /// Uniforms of a frame. Numbers are good until [`Slots::clear`].
 pub(crate) struct Slots<T> {
@@ -16,8 +16,11 @@ pub(crate) struct Slots<T> {
 }
 
 impl<T: Pod> Slots<T> {
+    /// Bytes from one uniform to the next.
+    const STRIDE: u64 = (size_of::<T>() as u64).next_multiple_of(ALIGNMENT);
+
     pub(crate) fn new(device: &wgpu::Device, label: &'static str) -> Slots<T> {
-        let buffer = GrowBuffer::new(device, label, wgpu::BufferUsages::UNIFORM, 16 * STRIDE);
+        let buffer = GrowBuffer::new(device, label, wgpu::BufferUsages::UNIFORM, 16 * Self::STRIDE);
         Slots { buffer, groups: Vec::new(), bytes: Vec::new(), kind: PhantomData }
     }
 
@@ -26,9 +29,9 @@ impl<T: Pod> Slots<T> {
     }
 
     pub(crate) fn push(&mut self, uniform: &T) -> usize {
-        let slot = self.bytes.len() / STRIDE as usize;
+        let slot = self.bytes.len() / Self::STRIDE as usize;
         self.bytes.extend_from_slice(bytemuck::bytes_of(uniform));
-        self.bytes.resize((slot + 1) * STRIDE as usize, 0);
+        self.bytes.resize((slot + 1) * Self::STRIDE as usize, 0);
         slot
     }
 
@@ -37,7 +40,7 @@ impl<T: Pod> Slots<T> {
         if self.buffer.write(device, queue, &self.bytes) {
             self.groups.clear();
         }
-        let slots = self.bytes.len() as u64 / STRIDE;
+        let slots = self.bytes.len() as u64 / Self::STRIDE;
         for slot in self.groups.len() as u64..slots {
             let resource = wgpu::BindingResource::Buffer(self.binding(slot as usize));
             let entries = &[wgpu::BindGroupEntry { binding: 0, resource }];
@@ -49,7 +52,7 @@ impl<T: Pod> Slots<T> {
     pub(crate) fn binding(&self, slot: usize) -> wgpu::BufferBinding<'_> {
         wgpu::BufferBinding {
             buffer: &self.buffer.buffer,
-            offset: slot as u64 * STRIDE,
+            offset: slot as u64 * Self::STRIDE,
             size: wgpu::BufferSize::new(size_of::<T>() as u64),
         }
     }

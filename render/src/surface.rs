@@ -2,18 +2,24 @@
 
 use crate::author::{Authors, STANDARD};
 use crate::cache::VERTEX_BUFFERS;
-use crate::draws::{Alpha, Kind};
-use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT, SAMPLES};
+use crate::draws::{Alpha, Kind, Needs};
+use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT};
 use crate::layouts::Layouts;
 use crate::shaders;
 use std::collections::HashMap;
-use umbriel_scene::Material;
+use umbriel_scene::{Material, Samples};
 
 /// What a pass over the surfaces does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Pass {
     /// Depth, ambient and emitted light and the lights of the surface pass.
     Base,
+    /// Depth alone.
+    Depth,
+    /// As [`Pass::Base`], on what is in depth already, where the stencil is 0.
+    BaseLit,
+    /// The same where the stencil is not 0.
+    BaseInShadow,
     /// Half-transparent shapes over what is there.
     Blend,
     /// One light where the stencil is 0.
@@ -28,6 +34,8 @@ pub(crate) enum Pass {
     VisibilityAdd,
     /// What the shadow texture shows of one light.
     VisibilitySoft,
+    /// Sets the stencil to its reference where a shape shows.
+    Mark,
     /// Sets the stencil to 0 where a shape shows that receives no shadows.
     Exempt,
 }
@@ -36,24 +44,39 @@ impl Pass {
     /// What of a kind matters: shaders of authors shade, and only that.
     fn seen(self, kind: Kind) -> Kind {
         match self {
-            Pass::Base | Pass::Blend | Pass::Add | Pass::AddSoft | Pass::AddInShadow => kind,
-            Pass::Visibility | Pass::VisibilityAdd | Pass::VisibilitySoft | Pass::Exempt => Kind { shader: STANDARD, ..kind },
+            Pass::Base | Pass::BaseLit | Pass::BaseInShadow => kind,
+            Pass::Blend | Pass::Add | Pass::AddSoft | Pass::AddInShadow => kind,
+            // Its alpha may be its own, too.
+            Pass::Depth if kind.alpha == Alpha::Mask => kind,
+            Pass::Depth | Pass::Mark | Pass::Exempt => Kind { shader: STANDARD, needs: Needs::default(), ..kind },
+            Pass::Visibility | Pass::VisibilityAdd | Pass::VisibilitySoft => Kind { shader: STANDARD, ..kind },
         }
     }
 }
 
-/// Pipelines by pass and kind of drawable.
+/// What all surfaces of a frame need of their shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct FrameNeeds {
+    /// Some light has maps.
+    pub(crate) maps: bool,
+    pub(crate) fog: bool,
+}
+
+/// Pipelines by pass and kind of drawable. Each holds of the shader only what its drawables and the frame need: devices
+/// without cheap branches, software ones among them, pay for every function that could be called.
 pub(crate) struct Surface {
     module: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
     /// With the shadow texture beside the view.
     soft_layout: wgpu::PipelineLayout,
     authors: Authors,
-    pipelines: HashMap<(Pass, Kind), wgpu::RenderPipeline>,
+    samples: Samples,
+    frame: FrameNeeds,
+    pipelines: HashMap<(Pass, Kind, FrameNeeds), wgpu::RenderPipeline>,
 }
 
 impl Surface {
-    pub(crate) fn new(device: &wgpu::Device, layouts: &Layouts) -> Surface {
+    pub(crate) fn new(device: &wgpu::Device, layouts: &Layouts, samples: Samples) -> Surface {
         let layout = |view| {
             device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some("surface"),
@@ -63,7 +86,26 @@ impl Surface {
         };
         let (layout, soft_layout) = (layout(&layouts.view), layout(&layouts.soft_view));
         let module = shaders::module(device, "surface", &[&shaders::surface()]);
-        Surface { module, layout, soft_layout, authors: Authors::default(), pipelines: HashMap::new() }
+        Surface {
+            module,
+            layout,
+            soft_layout,
+            authors: Authors::default(),
+            samples,
+            frame: FrameNeeds { maps: true, fog: true },
+            pipelines: HashMap::new(),
+        }
+    }
+
+    /// Draws with so many samples from now on.
+    pub(crate) fn set_samples(&mut self, samples: Samples) {
+        self.samples = samples;
+        self.pipelines.clear();
+    }
+
+    /// What is made and drawn from now on belongs to such a frame.
+    pub(crate) fn set_frame(&mut self, frame: FrameNeeds) {
+        self.frame = frame;
     }
 
     /// Makes the pipeline where there is none yet.
@@ -72,12 +114,12 @@ impl Surface {
         let module = self.authors.get(kind.shader).map_or(&self.module, |author| &author.module);
         let is_soft = matches!(pass, Pass::AddSoft | Pass::VisibilitySoft);
         let layout = if is_soft { &self.soft_layout } else { &self.layout };
-        let make = || pipeline(device, module, layout, pass, kind);
-        self.pipelines.entry((pass, kind)).or_insert_with(make);
+        let make = || pipeline(device, (module, layout), pass, (kind, self.frame), self.samples);
+        self.pipelines.entry((pass, kind, self.frame)).or_insert_with(make);
     }
 
     pub(crate) fn get(&self, pass: Pass, kind: Kind) -> Option<&wgpu::RenderPipeline> {
-        self.pipelines.get(&(pass, pass.seen(kind)))
+        self.pipelines.get(&(pass, pass.seen(kind), self.frame))
     }
 
     /// Number of the shader that an author wrote for a material.
@@ -99,7 +141,7 @@ impl Surface {
     pub(crate) fn drop_unused(&mut self, frame: u64) {
         let gone = self.authors.drop_unused(frame);
         if !gone.is_empty() {
-            self.pipelines.retain(|(_, kind), _| !gone.contains(&kind.shader));
+            self.pipelines.retain(|(_, kind, _), _| !gone.contains(&kind.shader));
         }
     }
 }
@@ -115,32 +157,33 @@ pub(crate) fn topology_of(number: u8) -> wgpu::PrimitiveTopology {
 
 fn pipeline(
     device: &wgpu::Device,
-    module: &wgpu::ShaderModule,
-    layout: &wgpu::PipelineLayout,
+    (module, layout): (&wgpu::ShaderModule, &wgpu::PipelineLayout),
     pass: Pass,
-    kind: Kind,
+    (kind, frame): (Kind, FrameNeeds),
+    samples: Samples,
 ) -> wgpu::RenderPipeline {
     let entry = match (pass, kind.alpha) {
-        (Pass::Base, Alpha::Mask) => "masked",
-        (Pass::Base, _) => "opaque",
+        (Pass::Base | Pass::BaseLit | Pass::BaseInShadow, Alpha::Mask) => "masked",
+        (Pass::Base | Pass::BaseLit | Pass::BaseInShadow, _) => "opaque",
+        (Pass::Depth, Alpha::Mask) => "holes",
         (Pass::Blend, _) => "blended",
         (Pass::Add, _) => "added",
         (Pass::AddSoft, _) => "added_soft",
         (Pass::VisibilitySoft, _) => "visibility_soft",
         (Pass::AddInShadow, _) => "added_in_shadow",
         (Pass::Visibility | Pass::VisibilityAdd, _) => "visibility",
-        (Pass::Exempt, _) => "nothing",
+        (Pass::Depth | Pass::Mark | Pass::Exempt, _) => "nothing",
     };
-    let fills_depth = matches!(pass, Pass::Base | Pass::Visibility);
-    let adds = matches!(pass, Pass::Add | Pass::AddInShadow | Pass::VisibilityAdd | Pass::AddSoft | Pass::VisibilitySoft);
-    let depth_compare = if adds || pass == Pass::Exempt { wgpu::CompareFunction::Equal } else { wgpu::CompareFunction::Greater };
+    let fills_depth = matches!(pass, Pass::Base | Pass::Depth | Pass::Visibility);
+    let depth_compare =
+        if fills_depth || pass == Pass::Blend { wgpu::CompareFunction::Greater } else { wgpu::CompareFunction::Equal };
     let sum = |dst_factor| wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,
         dst_factor,
         operation: wgpu::BlendOperation::Add,
     };
     let blend = match pass {
-        Pass::Base | Pass::Visibility | Pass::Exempt => None,
+        Pass::Base | Pass::Depth | Pass::BaseLit | Pass::BaseInShadow | Pass::Visibility | Pass::Mark | Pass::Exempt => None,
         Pass::Blend => Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
         Pass::Add | Pass::AddInShadow | Pass::VisibilityAdd | Pass::AddSoft | Pass::VisibilitySoft => {
             Some(wgpu::BlendState { color: sum(wgpu::BlendFactor::One), alpha: sum(wgpu::BlendFactor::One) })
@@ -148,12 +191,21 @@ fn pipeline(
     };
     let stencil = match pass {
         Pass::Exempt => without_shadow(),
-        Pass::Add | Pass::VisibilityAdd => where_volumes(wgpu::CompareFunction::Equal),
-        Pass::AddInShadow => where_volumes(wgpu::CompareFunction::NotEqual),
+        Pass::Mark => replacing(),
+        Pass::BaseLit | Pass::Add | Pass::VisibilityAdd => where_volumes(wgpu::CompareFunction::Equal),
+        Pass::BaseInShadow | Pass::AddInShadow => where_volumes(wgpu::CompareFunction::NotEqual),
         _ => wgpu::StencilState::default(),
     };
-    let write_mask = if pass == Pass::Exempt { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
-    let compilation_options = wgpu::PipelineCompilationOptions::default();
+    let write_mask =
+        if matches!(pass, Pass::Depth | Pass::Mark | Pass::Exempt) { wgpu::ColorWrites::empty() } else { wgpu::ColorWrites::ALL };
+    let constants = [
+        ("TEXTURES", f64::from(kind.needs.textures)),
+        ("LAYERS", f64::from(kind.needs.layers)),
+        ("SHADING", f64::from(kind.needs.shading)),
+        ("MAPS", f64::from(u8::from(frame.maps))),
+        ("FOG", f64::from(u8::from(frame.fog))),
+    ];
+    let compilation_options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(entry),
         layout: Some(layout),
@@ -176,7 +228,7 @@ fn pipeline(
             stencil,
             bias: wgpu::DepthBiasState::default(),
         }),
-        multisample: wgpu::MultisampleState { count: SAMPLES, ..Default::default() },
+        multisample: wgpu::MultisampleState { count: samples.count(), ..Default::default() },
         fragment: Some(wgpu::FragmentState {
             module,
             entry_point: Some(entry),
@@ -197,5 +249,11 @@ fn where_volumes(compare: wgpu::CompareFunction) -> wgpu::StencilState {
 /// Forgets what volumes were counted.
 fn without_shadow() -> wgpu::StencilState {
     let face = wgpu::StencilFaceState { pass_op: wgpu::StencilOperation::Zero, ..wgpu::StencilFaceState::IGNORE };
+    wgpu::StencilState { front: face, back: face, read_mask: 0xff, write_mask: 0xff }
+}
+
+/// Sets the stencil to its reference.
+pub(crate) fn replacing() -> wgpu::StencilState {
+    let face = wgpu::StencilFaceState { pass_op: wgpu::StencilOperation::Replace, ..wgpu::StencilFaceState::IGNORE };
     wgpu::StencilState { front: face, back: face, read_mask: 0xff, write_mask: 0xff }
 }

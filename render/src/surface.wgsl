@@ -46,17 +46,17 @@ fn place(f: Fragment) -> Surface {
     var s: Surface;
     s.base_color = base_color_at(f.uv0, f.uv1, f.color);
     s.emissive = material.emissive;
-    if material.textures[4].present != 0u {
+    if has_texture(4u) {
         s.emissive *= textureSample(emissive_texture, emissive_sampler, texture_place(4u, f.uv0, f.uv1)).rgb;
     }
     s.occlusion = 1.0;
-    if material.textures[3].present != 0u {
+    if has_texture(3u) {
         let o = textureSample(occlusion_texture, occlusion_sampler, texture_place(3u, f.uv0, f.uv1)).r;
         s.occlusion = 1.0 + material.occlusion_strength * (o - 1.0);
     }
     s.metallic = material.metallic;
     s.roughness = material.roughness;
-    if material.textures[1].present != 0u {
+    if has_texture(1u) {
         let m = textureSample(metallic_roughness_texture, metallic_roughness_sampler, texture_place(1u, f.uv0, f.uv1));
         s.metallic *= m.b;
         s.roughness *= m.g;
@@ -65,7 +65,7 @@ fn place(f: Fragment) -> Surface {
     s.uv0 = f.uv0;
     s.uv1 = f.uv1;
     s.vertex_color = f.color;
-    s.pixel = f.clip.xy;
+    s.pixel = f.clip.xy - view.window.xy;
     let to_eye = view.eye_in_world.xyz - f.p_in_world;
     s.distance = length(to_eye);
     s.towards_eye = to_eye / max(s.distance, 1e-9);
@@ -74,7 +74,7 @@ fn place(f: Fragment) -> Surface {
     let down = dpdy(f.p_in_world);
     let area_normal = cross(across, down);
     let has_normal = dot(f.normal, f.normal) > 1e-12;
-    s.is_unlit = material.shading == UNLIT || !has_normal;
+    s.is_unlit = shading() == UNLIT || !has_normal;
     var n = f.normal * inverseSqrt(max(dot(f.normal, f.normal), 1e-24));
     s.face_normal = n;
     if dot(area_normal, area_normal) > 0.0 {
@@ -85,7 +85,7 @@ fn place(f: Fragment) -> Surface {
     }
     // The side that is seen, whatever the winding says: real models have triangles that turn against their normals.
     let side = select(-1.0, 1.0, dot(n, s.face_normal) >= 0.0);
-    if material.textures[2].present != 0u {
+    if has_texture(2u) {
         n = bumped(f, n, across, down);
     }
     s.normal = side * n;
@@ -137,7 +137,7 @@ fn reflected(s: Surface, flags: u32, shadow: f32) -> vec3<f32> {
         // Of a light that the surface lists, all is shadowed.
         let takes_ambient = casts && lists_lights(flags);
         var share = shadow;
-        if light.face_count > 0u && casts {
+        if MAPS && light.face_count > 0u && casts {
             // What faces away stands in its own shadow.
             var lit = 0.0;
             if dot(s.normal, in_.towards) > 0.0 {
@@ -234,7 +234,7 @@ fn share_through_map(f: Fragment) -> vec4<f32> {
     }
     let light = lights[view.shown_light];
     var lit = 1.0;
-    if light.face_count > 0u && casts_on(light, view.shown_light, f.flags) {
+    if MAPS && light.face_count > 0u && casts_on(light, view.shown_light, f.flags) {
         lit = map_visibility(light, f.p_in_world, s.face_normal);
     }
     return vec4<f32>(vec3<f32>(lit), 1.0);
@@ -265,7 +265,16 @@ fn visibility_soft(f: Fragment) -> @location(0) vec4<f32> {
     return share_through_map(f) * shown;
 }
 
-// For what it does to the stencil.
+// Depth of what has holes.
+@fragment
+fn holes(f: Fragment) -> @location(0) vec4<f32> {
+    if place(f).base_color.a < material.alpha_cutoff {
+        discard;
+    }
+    return vec4<f32>(0.0);
+}
+
+// For what it does to depth or stencil.
 @fragment
 fn nothing() -> @location(0) vec4<f32> {
     return vec4<f32>(0.0);

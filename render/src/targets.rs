@@ -1,9 +1,9 @@
 //! Textures that pictures are made in.
 
-use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT, SAMPLES};
+use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT};
 use crate::soft::SoftTarget;
 use std::collections::HashMap;
-use umbriel_scene::{Layout, Picture};
+use umbriel_scene::{Layout, Picture, Samples};
 
 /// Finished pictures: 8 bit, as they are shown or saved.
 pub(crate) const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -81,9 +81,10 @@ pub(crate) fn picture_group(device: &wgpu::Device, layout: &wgpu::BindGroupLayou
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("picture"), layout, entries })
 }
 
-/// What a view is drawn in, shared by all views of its size.
+/// What a sheet of views is drawn in, shared by all sheets of its size.
 pub(crate) struct ViewTarget {
-    pub(crate) samples: wgpu::TextureView,
+    /// Colour of every sample; none where `resolved` is drawn in itself.
+    samples: Option<wgpu::TextureView>,
     pub(crate) resolved: wgpu::TextureView,
     pub(crate) depth: wgpu::TextureView,
     /// Made when the first soft shadow needs it.
@@ -91,6 +92,18 @@ pub(crate) struct ViewTarget {
     /// Group 1 of the pass that reads `resolved`.
     pub(crate) group: wgpu::BindGroup,
     last_used: u64,
+}
+
+impl ViewTarget {
+    /// What is drawn in.
+    pub(crate) fn colour(&self) -> &wgpu::TextureView {
+        self.samples.as_ref().unwrap_or(&self.resolved)
+    }
+
+    /// Where the last pass brings the mean of the samples.
+    pub(crate) fn resolve_target(&self) -> Option<&wgpu::TextureView> {
+        self.samples.as_ref().map(|_| &self.resolved)
+    }
 }
 
 /// View targets by size.
@@ -103,7 +116,7 @@ impl ViewTargets {
         device: &wgpu::Device,
         picture_layout: &wgpu::BindGroupLayout,
         size: [u32; 2],
-        is_soft: bool,
+        (samples, is_soft): (Samples, bool),
         frame: u64,
     ) {
         let target = self.0.entry(size).or_insert_with(|| {
@@ -123,10 +136,10 @@ impl ViewTargets {
             let none = wgpu::TextureUsages::empty();
             let resolved = view("resolved", LINEAR_FORMAT, 1, wgpu::TextureUsages::TEXTURE_BINDING);
             ViewTarget {
-                samples: view("samples", LINEAR_FORMAT, SAMPLES, none),
+                samples: (samples != Samples::One).then(|| view("samples", LINEAR_FORMAT, samples.count(), none)),
                 group: picture_group(device, picture_layout, &resolved),
                 resolved,
-                depth: view("depth", DEPTH_FORMAT, SAMPLES, wgpu::TextureUsages::TEXTURE_BINDING),
+                depth: view("depth", DEPTH_FORMAT, samples.count(), wgpu::TextureUsages::TEXTURE_BINDING),
                 soft: None,
                 last_used: frame,
             }

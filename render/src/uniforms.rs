@@ -11,10 +11,13 @@ pub(crate) struct View {
     pub(crate) view_from_world: [[f32; 4]; 4],
     pub(crate) eye_in_world: [f32; 4],
     pub(crate) viewport: [f32; 4],
+    pub(crate) window: [f32; 4],
     pub(crate) first_light: u32,
     pub(crate) light_count: u32,
     pub(crate) exposure: f32,
     pub(crate) shown_light: u32,
+    pub(crate) first_sample: [f32; 2],
+    pub(crate) spare: [u32; 2],
 }
 
 /// `Instance` of shaders/instance.wgsl.

@@ -284,11 +284,20 @@ fn three_hundred_layers() {
         cuboid(Vec3::new(reach, 0.0002, 0.8)).at(Vec3::new(reach, 1.0 + 0.001 * i as f32, 0.0))
     };
     let plates: Vec<Thing> = (0..300).map(plate).collect();
+    // One surface, folded to and fro.
+    let edge = |i: u32| {
+        let x = if i.is_multiple_of(2) { 0.0 } else { [1.5, 1.0, 0.5][(i as usize - 1) / 128] };
+        [-0.8, 0.8].map(|z| Vec3::new(x, 1.0 + 0.001 * i as f32, z))
+    };
+    let folds = (0..300u32).flat_map(|i| [0, 1, 2, 2, 1, 3].map(|k| 2 * i + k)).collect();
+    let strip = soup((0..=300).flat_map(edge).collect(), folds);
     let view = looking(Vec3::new(0.7, 0.8, 2.4), Vec3::new(0.7, 0.0, 0.5), Frustum::symmetric(0.7, 128.0 / 96.0, 0.05));
     let mut gpus = both();
     for toward_light in [Vec4::new(0.02, 1.0, 0.01, 0.0), Vec4::new(0.7, 20.0, 0.0, 1.0)] {
         for (name, casters, silhouettes) in [
             ("300 casters", plates.clone(), Silhouettes::Compute),
+            ("one surface of 300 folds", vec![strip.clone()], Silhouettes::Compute),
+            ("a surface of 300 folds over another", vec![strip.clone(), strip.clone().at(Vec3::Y * 0.4)], Silhouettes::Compute),
             ("one mesh of 300 pieces", vec![merged(&plates)], Silhouettes::Compute),
             ("one mesh of 300 pieces as quads", vec![merged(&plates)], Silhouettes::Quads),
         ] {
@@ -392,6 +401,7 @@ fn all_settings_give_the_same_stencil() {
         ("all", VolumeSettings::default()),
         ("quads", VolumeSettings { silhouettes: Silhouettes::Quads, ..all_off }),
         ("all with quads", VolumeSettings { silhouettes: Silhouettes::Quads, ..VolumeSettings::default() }),
+        ("all but depth bounds", VolumeSettings { depth_bounds: false, ..VolumeSettings::default() }),
     ];
     let tilt = Mat4::from_rotation_translation(Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.5, 0.2), Vec3::new(-0.4, 0.8, 0.9));
     let casters = [
@@ -403,7 +413,7 @@ fn all_settings_give_the_same_stencil() {
         three_blades().at(Vec3::new(0.2, 1.0, -1.6)),
     ];
     let mut random = Random(11);
-    let mut totals = [VolumeDraws::default(); 6];
+    let mut totals = [VolumeDraws::default(); 7];
     for (samples, views) in [(1, 40), (4, 20)] {
         let mut gpu = Gpu::new(samples);
         let casters: Vec<Loaded> = casters.iter().map(|t| gpu.load(t)).collect();
@@ -425,8 +435,9 @@ fn all_settings_give_the_same_stencil() {
         }
     }
     println!("{totals:?}");
-    let [auto, culled, .., all, _, _] = totals;
+    let [auto, culled, _, all, _, _, unbounded] = totals;
     // Each of them had something to do.
     assert!(auto.z_pass > 40 && auto.z_fail > 40, "{auto:?}");
+    assert!(all.culled > unbounded.culled + 5, "{all:?} {unbounded:?}");
     assert!(culled.culled > 20 && all.culled > 20 && all.far_caps < culled.far_caps + all.z_fail, "{culled:?} {all:?}");
 }

@@ -161,11 +161,9 @@ impl Joined<'_> {
                 );
             }
         }
-        if let Some((handle, _)) = module.overrides.iter().next() {
-            return refused(
-                module.overrides.get_span(handle),
-                "`override` is not for shaders of shapes; use a field and `params`",
-            );
+        let mut overrides = module.overrides.iter().map(|(handle, _)| module.overrides.get_span(handle));
+        if let Some(span) = overrides.find(|span| self.is_own(*span)) {
+            return refused(span, "`override` is not for shaders of shapes; use a field and `params`");
         }
         if let Some(entry) = module.entry_points.first() {
             let message = format!("`{}` is an entry point; a shader brings surface, shade, ambient or finish", entry.name);

@@ -1,6 +1,7 @@
 //! Materials on the GPU: a uniform and the pictures that it names.
 
 use super::texture::{make_sampler, make_texture};
+use crate::draws::Needs;
 use crate::uniforms;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -14,6 +15,7 @@ pub(crate) struct GpuMaterial {
     pub(crate) double_sided: bool,
     /// Number of its shader; see [`crate::author`].
     pub(crate) shader: u32,
+    pub(crate) needs: Needs,
     /// Keeps the pictures, which other materials may share.
     _pictures: Vec<Arc<Picture>>,
 }
@@ -75,6 +77,12 @@ impl MaterialCache {
             }
             bound.push((picture, sampler));
         }
+        let is_there = |slot: &usize| uniform.textures[*slot].present != 0;
+        let needs = Needs {
+            textures: (0..uniform.textures.len()).filter(is_there).fold(0, |bits, slot| bits | 1 << slot),
+            layers: uniform.layer_count as u8,
+            shading: uniform.shading as u8,
+        };
         let contents = bytemuck::bytes_of(&uniform);
         let usage = wgpu::BufferUsages::UNIFORM;
         let buffer = device.create_buffer_init(&BufferInitDescriptor { label: Some("material"), contents, usage });
@@ -90,6 +98,7 @@ impl MaterialCache {
             alpha: material.alpha,
             double_sided: material.double_sided,
             shader,
+            needs,
             _pictures: bound.into_iter().map(|b| b.0).collect(),
         }
     }

@@ -43,7 +43,7 @@ fn layer_place(number: u32, f: Fragment) -> LayerPlace {
 // The base colour with all layers. Called in uniform control flow: it takes derivatives.
 fn layered(f: Fragment, s: Surface) -> vec4<f32> {
     var color = s.base_color;
-    if material.layer_count > 0u {
+    if LAYERS > 0u && material.layer_count > 0u {
         let at = layer_place(0u, f);
         var t = vec4<f32>(1.0);
         if material.layers[0].kind == PICTURE {
@@ -51,7 +51,7 @@ fn layered(f: Fragment, s: Surface) -> vec4<f32> {
         }
         color = over(0u, f, s, at, t, color);
     }
-    if material.layer_count > 1u {
+    if LAYERS > 1u && material.layer_count > 1u {
         let at = layer_place(1u, f);
         var t = vec4<f32>(1.0);
         if material.layers[1].kind == PICTURE {
@@ -59,7 +59,7 @@ fn layered(f: Fragment, s: Surface) -> vec4<f32> {
         }
         color = over(1u, f, s, at, t, color);
     }
-    if material.layer_count > 2u {
+    if LAYERS > 2u && material.layer_count > 2u {
         let at = layer_place(2u, f);
         var t = vec4<f32>(1.0);
         if material.layers[2].kind == PICTURE {
@@ -67,7 +67,7 @@ fn layered(f: Fragment, s: Surface) -> vec4<f32> {
         }
         color = over(2u, f, s, at, t, color);
     }
-    if material.layer_count > 3u {
+    if LAYERS > 3u && material.layer_count > 3u {
         let at = layer_place(3u, f);
         var t = vec4<f32>(1.0);
         if material.layers[3].kind == PICTURE {

@@ -53,6 +53,10 @@ const MAP_DARK_OUTSIDE: u32 = 2u;
 const MAP_POISSON: u32 = 4u;
 const MAP_PCSS: u32 = 8u;
 
+// What the lights and the air of a frame need.
+override MAPS: bool = true;
+override FOG: bool = true;
+
 @group(3) @binding(0) var<uniform> frame: Frame;
 @group(3) @binding(1) var<storage, read> lights: array<Light>;
 
@@ -86,7 +90,7 @@ fn incidence(light: Light, p_in_world: vec3<f32>) -> Incidence {
 
 // Share of fog at a distance from the eye (X3D Fog).
 fn fog_share(distance: f32) -> f32 {
-    if frame.fog_range <= 0.0 {
+    if !FOG || frame.fog_range <= 0.0 {
         return 0.0;
     }
     if distance >= frame.fog_range {

@@ -51,6 +51,13 @@ const OPAQUE: u32 = 0u;
 const MASK: u32 = 1u;
 const BLEND: u32 = 2u;
 
+// What the shapes of a pipeline need; the rest is left out of it.
+// A bit for each of the five textures.
+override TEXTURES: u32 = 31u;
+override LAYERS: u32 = 4u;
+// One of the kinds of shading; another number leaves it open.
+override SHADING: u32 = 3u;
+
 @group(2) @binding(0) var<uniform> material: Material;
 @group(2) @binding(1) var base_color_texture: texture_2d<f32>;
 @group(2) @binding(2) var base_color_sampler: sampler;
@@ -63,6 +70,17 @@ const BLEND: u32 = 2u;
 @group(2) @binding(9) var emissive_texture: texture_2d<f32>;
 @group(2) @binding(10) var emissive_sampler: sampler;
 
+fn has_texture(slot: u32) -> bool {
+    return (TEXTURES & (1u << slot)) != 0u && material.textures[slot].present != 0u;
+}
+
+fn shading() -> u32 {
+    if SHADING > UNLIT {
+        return material.shading;
+    }
+    return SHADING;
+}
+
 fn texture_place(slot: u32, uv0: vec2<f32>, uv1: vec2<f32>) -> vec2<f32> {
     let t = material.textures[slot];
     let uv = select(uv0, uv1, t.uv_set == 1u);
@@ -72,7 +90,7 @@ fn texture_place(slot: u32, uv0: vec2<f32>, uv1: vec2<f32>) -> vec2<f32> {
 // Linear RGBA with texture and vertex colour.
 fn base_color_at(uv0: vec2<f32>, uv1: vec2<f32>, vertex_color: vec4<f32>) -> vec4<f32> {
     var color = material.base_color * vertex_color;
-    if material.textures[0].present != 0u {
+    if has_texture(0u) {
         color *= textureSample(base_color_texture, base_color_sampler, texture_place(0u, uv0, uv1));
     }
     return color;

@@ -42,7 +42,7 @@ struct LightSample {
 
 // Light that is reflected towards the eye.
 fn standard_shade(s: Surface, light: LightSample) -> vec3<f32> {
-    if material.shading == PHONG {
+    if shading() == PHONG {
         return phong_brdf(s, light.towards) * light.color * light.shadow;
     }
     return metallic_roughness_brdf(s, light.towards) * light.color * light.shadow;

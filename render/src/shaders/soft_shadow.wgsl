@@ -10,8 +10,8 @@
 fn hidden_share(at: vec2<f32>, depth: f32, slopes: vec2<f32>) -> f32 {
     let pixel = vec2<i32>(at);
     let last = vec2<i32>(textureDimensions(soft_shadow)) - 1;
-    // Depths are those of the first of four samples.
-    let sampled = depth + dot(slopes, vec2<f32>(-0.125, -0.375));
+    // Depths are those of the first sample.
+    let sampled = depth + dot(slopes, view.first_sample);
     var best = abs(textureLoad(shadowed_depth, pixel, 0).y - sampled);
     if best <= 1e-3 * sampled {
         return textureLoad(soft_shadow, pixel, 0).x;

@@ -6,8 +6,10 @@ struct View {
     view_from_world: mat4x4<f32>,
     // The eye in the world; w = 1. Of parallel light w = 0 and xyz is the direction towards the light.
     eye_in_world: vec4<f32>,
-    // Left, top, width, height, pixels.
+    // Left, top, width, height in the picture, pixels.
     viewport: vec4<f32>,
+    // The same in the target that is drawn in, which several views may share.
+    window: vec4<f32>,
     // Lights that the pass adds up, as a range of the frame's list.
     first_light: u32,
     light_count: u32,
@@ -15,6 +17,8 @@ struct View {
     exposure: f32,
     // Of a pass that shows one light's visibility: its place in the frame's list.
     shown_light: u32,
+    // Where the first sample of a pixel lies, from its centre, pixels right and down.
+    first_sample: vec2<f32>,
 };
 
 @group(0) @binding(0) var<uniform> view: View;

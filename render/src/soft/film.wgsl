@@ -1,7 +1,7 @@
-// A film as strong as the soft shadow, sample by sample. Concatenated after shaders/soft_shadow.wgsl, shaders/fullscreen.wgsl
-// and film.wgsl.
+// A film as strong as the soft shadow, sample by sample. Concatenated after shaders/{one_sample, four_samples}.wgsl,
+// shaders/view.wgsl, shaders/soft_shadow.wgsl, shaders/fullscreen.wgsl and film.wgsl.
 
-@group(2) @binding(0) var depth: texture_depth_multisampled_2d;
+@group(2) @binding(0) var depth: Depths;
 
 @fragment
 fn soft_tint(f: Fullscreen, @builtin(sample_index) sample: u32) -> @location(0) vec4<f32> {

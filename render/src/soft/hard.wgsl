@@ -1,7 +1,8 @@
-// The hard shadow out of the stencil (004 section 3.2.2, step 2). Concatenated after shaders/fullscreen.wgsl.
+// The hard shadow out of the stencil (004 section 3.2.2, step 2). Concatenated after
+// shaders/{one_sample, four_samples}.wgsl and shaders/fullscreen.wgsl.
 
-@group(0) @binding(0) var depth: texture_depth_multisampled_2d;
-@group(0) @binding(1) var stencil: texture_multisampled_2d<u32>;
+@group(0) @binding(0) var depth: Depths;
+@group(0) @binding(1) var stencil: Stencils;
 
 // Share of the samples that are in shadow, of those on the surface of the first one; its depth.
 @fragment
@@ -10,7 +11,7 @@ fn hard_shadow(@builtin(position) at: vec4<f32>) -> @location(0) vec2<f32> {
     let first = textureLoad(depth, pixel, 0);
     var dark = 0.0;
     var count = 0.0;
-    for (var i = 0; i < 4; i++) {
+    for (var i = 0; i < SAMPLES; i++) {
         if abs(textureLoad(depth, pixel, i) - first) <= 0.05 * first {
             dark += select(0.0, 1.0, textureLoad(stencil, pixel, i).r != 0u);
             count += 1.0;

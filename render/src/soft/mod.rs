@@ -22,7 +22,7 @@ use crate::slots::Slots;
 use crate::volumes::{VolumeJob, VolumePass};
 use bytemuck::{Pod, Zeroable};
 use silhouettes::Silhouettes;
-use umbriel_scene::{Light, Scene};
+use umbriel_scene::{Light, Samples, Scene};
 
 /// `Source` of soft/source.wgsl.
 #[repr(C)]
@@ -85,9 +85,9 @@ pub(crate) fn soft_jobs(scene: &Scene, lights: &Lights, purposes: &[Purpose], jo
 }
 
 impl SoftPass {
-    pub(crate) fn new(device: &wgpu::Device, layouts: &crate::layouts::Layouts) -> SoftPass {
+    pub(crate) fn new(device: &wgpu::Device, layouts: &crate::layouts::Layouts, samples: Samples) -> SoftPass {
         SoftPass {
-            passes: Passes::new(device, layouts),
+            passes: Passes::new(device, layouts, samples),
             gather: silhouettes::Gather::new(device),
             sources: Slots::new(device, "soft sources"),
             layers: Vec::new(),

@@ -2,9 +2,10 @@
 
 use super::target::{HARD_FORMAT, HIDDEN_FORMAT, RADIUS_FORMAT, SoftTarget};
 use crate::clock::Clock;
-use crate::gpu::{LINEAR_FORMAT, SAMPLES};
+use crate::gpu::LINEAR_FORMAT;
 use crate::layouts::Layouts;
 use crate::shaders;
+use umbriel_scene::Samples;
 use wgpu::{BindingResource, BindingType, BlendComponent, BlendFactor, BlendOperation, ShaderStages, TextureSampleType};
 
 /// Pipelines, in the order in which they run.
@@ -36,22 +37,23 @@ fn texture(binding: u32, sample_type: TextureSampleType, multisampled: bool) -> 
 }
 
 impl Passes {
-    pub(super) fn new(device: &wgpu::Device, layouts: &Layouts) -> Passes {
+    pub(super) fn new(device: &wgpu::Device, layouts: &Layouts, samples: Samples) -> Passes {
         let group = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
         };
+        let are_many = samples != Samples::One;
         let plain = TextureSampleType::Float { filterable: false };
         let source = buffer(0, wgpu::BufferBindingType::Uniform);
         let list = buffer(2, wgpu::BufferBindingType::Storage { read_only: true });
         let stencil_layout = group(
             "view depth and stencil",
-            &[texture(0, TextureSampleType::Depth, true), texture(1, TextureSampleType::Uint, true)],
+            &[texture(0, TextureSampleType::Depth, are_many), texture(1, TextureSampleType::Uint, are_many)],
         );
         let wedge_layout = group("wedges", &[source, texture(1, plain, false), list]);
         let penumbra_layout = group("penumbra", &[source, texture(1, plain, false), texture(3, plain, false)]);
-        let depth_layout = group("view depth", &[texture(0, TextureSampleType::Depth, true)]);
+        let depth_layout = group("view depth", &[texture(0, TextureSampleType::Depth, are_many)]);
         let view = Some(&layouts.view);
-        let hard = Stage::new("hard_shadow", shaders::HARD_SHADOW);
+        let hard = Stage::new("hard_shadow", &shaders::of_samples(samples, shaders::HARD_SHADOW));
         let largest =
             BlendComponent { src_factor: BlendFactor::One, dst_factor: BlendFactor::One, operation: BlendOperation::Max };
         let wedges = Stage {
@@ -60,7 +62,7 @@ impl Passes {
             // The sides away from the eye are there wherever the eye is.
             cull_mode: Some(wgpu::Face::Front),
             blend: Some(wgpu::BlendState { color: largest, alpha: largest }),
-            ..Stage::new("penumbra_radius", shaders::WEDGES)
+            ..Stage::new("penumbra_radius", &shaders::WEDGES.concat())
         };
         // Past several layers of casters: 1 - (1 - a) (1 - b).
         let past =
@@ -68,13 +70,13 @@ impl Passes {
         let penumbra = Stage {
             target: HIDDEN_FORMAT,
             blend: Some(wgpu::BlendState { color: past, alpha: past }),
-            ..Stage::new("soft_shadow", shaders::PENUMBRA)
+            ..Stage::new("soft_shadow", &shaders::PENUMBRA.concat())
         };
         let film = Stage {
             target: LINEAR_FORMAT,
-            samples: SAMPLES,
+            samples: samples.count(),
             blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-            ..Stage::new("soft_tint", shaders::SOFT_FILM)
+            ..Stage::new("soft_tint", &shaders::of_samples(samples, shaders::SOFT_FILM))
         };
         Passes {
             hard: hard.pipeline(device, &[Some(&stencil_layout)]),
@@ -183,7 +185,7 @@ fn begin<'e>(
 struct Stage {
     vertex: &'static str,
     fragment: &'static str,
-    parts: &'static [&'static str],
+    source: String,
     target: wgpu::TextureFormat,
     samples: u32,
     cull_mode: Option<wgpu::Face>,
@@ -191,9 +193,9 @@ struct Stage {
 }
 
 impl Stage {
-    fn new(fragment: &'static str, parts: &'static [&'static str]) -> Stage {
+    fn new(fragment: &'static str, source: &str) -> Stage {
         let (vertex, target) = ("fullscreen", HARD_FORMAT);
-        Stage { vertex, fragment, parts, target, samples: 1, cull_mode: None, blend: None }
+        Stage { vertex, fragment, source: source.to_owned(), target, samples: 1, cull_mode: None, blend: None }
     }
 
     fn pipeline(&self, device: &wgpu::Device, groups: &[Option<&wgpu::BindGroupLayout>]) -> wgpu::RenderPipeline {
@@ -202,7 +204,7 @@ impl Stage {
             bind_group_layouts: groups,
             immediate_size: 0,
         });
-        let module = shaders::module(device, self.fragment, self.parts);
+        let module = shaders::module(device, self.fragment, &[&self.source]);
         let target = wgpu::ColorTargetState { format: self.target, blend: self.blend, write_mask: wgpu::ColorWrites::ALL };
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.fragment),

@@ -78,7 +78,7 @@ fn soft_shadow(f: Fullscreen) -> @location(0) f32 {
         let in_clip = middle_in_clip + first_in_clip * place.x + second_in_clip * place.y;
         let ndc = in_clip.xy / max(in_clip.w, 1e-9);
         // What lies outside of the picture goes on as its edge.
-        let tap = clamp((ndc * vec2<f32>(0.5, -0.5) + 0.5) * size - FIRST_SAMPLE, vec2<f32>(0.5), size - 0.5);
+        let tap = clamp((ndc * vec2<f32>(0.5, -0.5) + 0.5) * size - view.first_sample, vec2<f32>(0.5), size - 0.5);
         let tapped = textureLoad(hard, vec2<i32>(tap), 0).xy;
         let expected = own.y + dot(slopes, floor(tap) - at);
         if abs(tapped.y - expected) <= tolerance * expected {

@@ -11,12 +11,9 @@ struct Source {
 // The hard shadow's share of each pixel, and the depth of its first sample.
 @group(1) @binding(1) var hard: texture_2d<f32>;
 
-// Where the first of four samples lies in its pixel (standard sample locations), from the centre.
-const FIRST_SAMPLE = vec2<f32>(-0.125, -0.375);
-
 fn ndc_at(pixel: vec2<f32>) -> vec2<f32> {
     let size = vec2<f32>(textureDimensions(hard));
-    return ((pixel + 0.5 + FIRST_SAMPLE) / size * 2.0 - 1.0) * vec2<f32>(1.0, -1.0);
+    return ((pixel + 0.5 + view.first_sample) / size * 2.0 - 1.0) * vec2<f32>(1.0, -1.0);
 }
 
 fn world_at(pixel: vec2<f32>, depth: f32) -> vec3<f32> {

@@ -66,7 +66,7 @@ fn problem_of(device: &wgpu::Device, mesh: &Mesh, parts: &[Part]) -> Option<Stri
     if parts.iter().any(|p| p.largest_list() > limit) {
         return Some(format!("casts no shadow volume: its edges do not fit into a buffer of {limit} bytes"));
     }
-    (layers > parts::STENCIL_LAYERS).then(|| {
+    (layers > parts::GROUP_LAYERS).then(|| {
         format!("may put {layers} layers of shadow over a point: where they are a multiple of 128, its volume shadow has a hole")
     })
 }

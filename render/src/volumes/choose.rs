@@ -19,8 +19,10 @@
 //! caps outside of the frustum cover no pixel.
 
 use super::reach::{self, Reach};
+use super::tiles::{Seen, Tiles};
 use super::{Surface, VolumeLight, hull};
 use glam::{DMat4, DVec3, DVec4};
+use std::cell::OnceCell;
 use umbriel_scene::{Aabb, View, VolumeCounting};
 
 /// A view, and what shadows may be seen on in it.
@@ -32,7 +34,13 @@ pub struct Sight {
     clip_from_world: DMat4,
     near_rectangle: [DVec4; 4],
     size: [u32; 2],
+    /// Left and top of the view in its target.
+    pub(super) origin: [u32; 2],
     receivers: Aabb,
+    view: View,
+    seen: Option<Seen>,
+    /// Made when the first volume asks.
+    tiles: OnceCell<Tiles>,
 }
 
 /// A rectangle of pixels: left, top, width, height.
@@ -77,8 +85,27 @@ impl Sight {
             near_rectangle: [(f.left, f.bottom), (f.right, f.bottom), (f.right, f.top), (f.left, f.top)]
                 .map(|(x, y)| near_corner(x, y)),
             size: view.size,
+            origin: [0, 0],
             receivers,
+            view: view.clone(),
+            seen: None,
+            tiles: OnceCell::new(),
         }
+    }
+
+    /// The same with what is known of surfaces in it: all that shadows may fall on, or else these go without a shadow.
+    pub fn with(self, seen: Seen) -> Sight {
+        Sight { seen: Some(seen), ..self }
+    }
+
+    fn tiles(&self) -> Option<&Tiles> {
+        let seen = self.seen.as_ref()?;
+        Some(self.tiles.get_or_init(|| Tiles::new(&self.view, seen)))
+    }
+
+    /// The same in a target where the view begins at this pixel.
+    pub fn at(self, origin: [u32; 2]) -> Sight {
+        Sight { origin, ..self }
     }
 
     pub(super) fn whole(&self) -> Scissor {
@@ -157,13 +184,13 @@ impl<'a> Watch<'a> {
         let is_safe = self.light.settings.counting == VolumeCounting::Auto
             && hull::are_apart(&self.between, &corners, self.axes.iter().copied(), margin);
         // Under parallel light without end the far cap is a point, whatever else is asked for.
-        let has_far_cap = !(toward.w == 0.0 && reach.is_infinite());
+        let has_far_cap = toward.w != 0.0 || reach.has_end();
         let mut choice = Choice { z_fail: !is_safe, far_caps: has_far_cap, ..all };
         if is_safe {
             let is_in_front = |plane: DVec4| sight.near_rectangle.iter().all(|n| plane.dot(*n) > 0.0);
             choice.near_caps = surface != Surface::BothSides;
             choice.convex_hides = surface == Surface::Front;
-            choice.far_caps &= !reach.is_infinite() && !reach.behind.is_some_and(is_in_front);
+            choice.far_caps &= reach.has_end() && !reach.behind.is_some_and(is_in_front);
         }
         if !self.light.settings.culling {
             return Some(choice);
@@ -176,9 +203,17 @@ impl<'a> Watch<'a> {
         }
         choice.near_caps &= !sight.is_outside(&corners, margin);
         choice.far_caps &= !sight.is_outside(&volume[8..], margin);
-        if !reach.is_infinite() {
+        if reach.times != f64::INFINITY {
             let swept = Aabb::from_points(volume.iter().map(|p| p.truncate().as_vec3()));
             choice.scissor = overlap(choice.scissor, sight.pixels(&common(&swept, &self.lit))?)?;
+        }
+        if self.light.settings.depth_bounds
+            && let Some(tiles) = sight.tiles()
+        {
+            let along = toward.truncate() - bounds.centre().as_dvec3() * toward.w;
+            let mut axes = vec![sight.ahead.truncate()];
+            axes.extend(DVec3::AXES.iter().flat_map(|axis| [*axis, along.cross(*axis)]));
+            choice.scissor = tiles.touched(&volume, &axes, choice.scissor, margin)?;
         }
         Some(choice)
     }

@@ -1,7 +1,7 @@
 //! Counts volumes into the stencil: both faces in one draw, in front of or behind what is seen.
 
 use super::Depth;
-use super::choose::Choice;
+use super::choose::{Choice, Sight};
 use super::extract::{Lists, Piece};
 use super::parts::{GROUP_LAYERS, STENCIL_LAYERS};
 use std::collections::HashMap;
@@ -153,18 +153,14 @@ impl Drawing {
     }
 
     /// Draws the lists of a job that a view shows, in groups that cannot overflow the stencil.
-    pub(super) fn run(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        shown: &[(&Lists, Choice)],
-        whole: [u32; 4],
-        view: &wgpu::BindGroup,
-    ) {
+    pub(super) fn run(&self, pass: &mut wgpu::RenderPass<'_>, shown: &[(&Lists, Choice)], sight: &Sight, view: &wgpu::BindGroup) {
         pass.set_bind_group(0, view, &[]);
         let total: u32 = shown.iter().map(|(l, _)| l.part.layers.min(STENCIL_LAYERS)).sum();
-        let mut scissor = whole;
+        let whole = in_target(sight, sight.whole());
+        let mut scissor = [0; 4];
+        cut(pass, &mut scissor, whole);
         if total <= STENCIL_LAYERS {
-            self.count(pass, shown, false, &mut scissor);
+            self.count(pass, shown, false, (sight, &mut scissor));
         } else {
             pass.set_stencil_reference(SHADOWED);
             for (i, group) in groups(shown, |(l, _)| l.part.layers).enumerate() {
@@ -173,14 +169,20 @@ impl Drawing {
                     pass.set_pipeline(&self.remember);
                     pass.draw(0..3, 0..1);
                 }
-                self.count(pass, group, true, &mut scissor);
+                self.count(pass, group, true, (sight, &mut scissor));
             }
         }
         cut(pass, &mut scissor, whole);
     }
 
     /// Draws all pieces, sorted so that pipelines follow each other.
-    fn count(&self, pass: &mut wgpu::RenderPass<'_>, shown: &[(&Lists, Choice)], grouped: bool, scissor: &mut [u32; 4]) {
+    fn count(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        shown: &[(&Lists, Choice)],
+        grouped: bool,
+        (sight, scissor): (&Sight, &mut [u32; 4]),
+    ) {
         let mut pieces = Vec::with_capacity(2 * shown.len());
         for (place, (lists, choice)) in shown.iter().enumerate() {
             let wanted = |piece| match piece {
@@ -203,7 +205,7 @@ impl Drawing {
             }
             if bound.replace(place) != Some(place) {
                 pass.set_bind_group(1, &lists.placed, &[]);
-                cut(pass, scissor, choice.scissor);
+                cut(pass, scissor, in_target(sight, choice.scissor));
                 if let Some(listed) = &lists.listed {
                     pass.set_index_buffer(listed.indices.slice(..), wgpu::IndexFormat::Uint32);
                 }
@@ -222,6 +224,11 @@ impl Kind {
         let quads = lists.listed.is_none().then_some(piece);
         Kind { grouped, quads, z_fail, turned: piece == Piece::TurnedCaps }
     }
+}
+
+/// A rectangle of a view in the view's target.
+fn in_target(sight: &Sight, [left, top, width, height]: [u32; 4]) -> [u32; 4] {
+    [left + sight.origin[0], top + sight.origin[1], width, height]
 }
 
 fn cut(pass: &mut wgpu::RenderPass<'_>, now: &mut [u32; 4], to: [u32; 4]) {

@@ -20,6 +20,7 @@ pub(super) const SHADER: &str = concat!(
 
 const EVERY_TRIANGLE: u32 = 1;
 const MIRRORED: u32 = 2;
+const POINTED: u32 = 4;
 
 /// Edges of more triangles than this are left to the compute pass: with degenerate quads, every corner of as many quads
 /// would ask all of them.
@@ -290,7 +291,9 @@ impl Extract {
     /// `None` where the device cannot hold it.
     pub(super) fn lists(&self, device: &wgpu::Device, wanted: &Wanted<'_>, old: Option<Lists>) -> Option<(Lists, Stale)> {
         let uniform = CasterUniform::new(wanted.light, wanted.world_from_object, wanted.bounds_in_world, wanted.part);
-        let content = CasterUniform { reach_w: wanted.reach_w, ..uniform };
+        let is_pointed = wanted.light.toward_light.w == 0.0 && wanted.reach_w == 0.0;
+        let flags = uniform.flags | if is_pointed { POINTED } else { 0 };
+        let content = CasterUniform { reach_w: wanted.reach_w, flags, ..uniform };
         let key = Key::new(wanted, content.flags);
         let is_listed = wanted.light.settings.silhouettes == Silhouettes::Compute || wanted.part.widest_edge > WIDEST_EDGE;
         let caster = wanted.caster;

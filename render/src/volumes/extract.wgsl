@@ -79,14 +79,19 @@ fn raise_edges(
     if sum == 0 {
         return;
     }
-    // The side runs against the triangles above it: p to q, then away from the light. Under parallel light without end
-    // the second triangle is a point.
+    // The side runs against the triangles above it: p to q, then away from the light.
     let p = 2u * select(e.x, e.y, sum > 0);
     let q = 2u * select(e.y, e.x, sum > 0);
     let times = u32(abs(sum));
-    var at = atomicAdd(&draws.sides.index_count, 6u * times);
+    // Under parallel light without end the far ends are one point, and the second triangle is none.
+    let is_pointed = (caster.flags & POINTED) != 0u;
+    var at = atomicAdd(&draws.sides.index_count, select(6u, 3u, is_pointed) * times);
     for (var k = 0u; k < times; k++) {
         put(at, p, q, q + 1u);
+        if is_pointed {
+            at += 3u;
+            continue;
+        }
         put(at + 3u, p, q + 1u, p + 1u);
         at += 6u;
     }

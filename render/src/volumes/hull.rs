@@ -16,7 +16,7 @@ pub(super) fn are_apart(a: &[DVec4], b: &[DVec4], axes: impl IntoIterator<Item =
 }
 
 /// Smallest and largest coordinate of a hull along a unit vector.
-fn extent(points: &[DVec4], axis: DVec3) -> (f64, f64) {
+pub(super) fn extent(points: &[DVec4], axis: DVec3) -> (f64, f64) {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for p in points {
         let x = p.truncate().dot(axis);

@@ -10,8 +10,8 @@
 //! After [`VolumePass::draw`] the stencil is not 0 exactly where the job's light is hidden by one of the job's casters.
 //! The stencil counts layers of shadow in eight bits. Jobs that may hold more are drawn in groups of at most 127 layers,
 //! after each of which the eighth bit remembers what is in shadow: any number of casters, and of pieces of a mesh, is
-//! exact. What remains is a single connected surface (or a mesh of very many loose pieces, see
-//! [`VolumeStats::may_wrap`]) that by itself puts exactly 128 or 256 layers between a point and the light.
+//! exact, and so is a surface that lies over itself more often, which is cut apart. What remains is a mesh of more than 8128
+//! layers, see [`VolumeStats::may_wrap`].
 //!
 //! Alpha-tested casters throw the shadow of their whole triangles.
 //!
@@ -25,10 +25,12 @@ mod hull;
 mod layers;
 mod parts;
 mod reach;
+mod tiles;
 
 pub(crate) use cache::GpuPart;
 pub use choose::Sight;
 pub(crate) use extract::CasterUniform;
+pub use tiles::Seen;
 
 use choose::Watch;
 use extract::{Lists, Stale, Wanted};
@@ -125,8 +127,8 @@ pub struct VolumeStats {
     pub left_out: usize,
     /// Casters whose shadow falls on nothing that receives.
     pub without_receiver: usize,
-    /// Lists of meshes with so many loose pieces that these may put more than 255 layers over a point. Where it is an
-    /// exact multiple of 128, the point is lit.
+    /// Lists of meshes with so many loose pieces, or such a deep surface, that they may put more than 127 layers over a point
+    /// however they are cut. Where it is an exact multiple of 128, the point is lit.
     pub may_wrap: usize,
 }
 
@@ -214,7 +216,7 @@ impl VolumePass {
                         bounds_in_world: &caster.bounds_in_world,
                         reach_w: reach.w(),
                     };
-                    stats.may_wrap += usize::from(part.layers > parts::STENCIL_LAYERS);
+                    stats.may_wrap += usize::from(part.layers > parts::GROUP_LAYERS);
                     let Some((made, is_stale)) = self.extract.lists(device, &wanted, old.take(part)) else {
                         stats.left_out += 1;
                         let name = &caster.mesh.name;
@@ -254,8 +256,8 @@ impl VolumePass {
 
     /// Counts the volumes of a job into the stencil, which must be 0 in the viewport; afterwards it is 0 where the light
     /// shines. Depth is read, stencil written, colour untouched; the stencil reference is changed. Depth was cleared to
-    /// infinity. `view` is the View uniform of the view that `sight` tells of;
-    /// the viewport is the whole target, of the view's size.
+    /// infinity. `view` is the View uniform of the view that `sight` tells of; viewport and scissor rectangle are the view's,
+    /// and the latter is so again afterwards.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, job: usize, view: &wgpu::BindGroup, sight: &Sight) -> VolumeDraws {
         let mut draws = VolumeDraws::default();
         let Some((job, light)) = self.jobs.get(job).and_then(|j| Some((j, j.light.as_ref()?))) else { return draws };
@@ -274,7 +276,7 @@ impl VolumePass {
         }
         let shown: Vec<_> = job.lists.iter().filter_map(|lists| Some((lists, choices[lists.caster]?))).collect();
         if !shown.is_empty() {
-            self.drawing.run(pass, &shown, sight.whole(), view);
+            self.drawing.run(pass, &shown, sight, view);
         }
         draws
     }

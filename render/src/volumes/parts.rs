@@ -7,10 +7,10 @@ use umbriel_scene::{Edges, Mesh};
 pub(super) const GROUP_LAYERS: u32 = 127;
 /// Layers that the stencil holds when a single group fills it.
 pub(super) const STENCIL_LAYERS: u32 = 255;
-/// A mesh of very many loose pieces is not cut further than this.
-const MAX_PARTS: usize = 8;
-/// Only surfaces of more faces can be a stack of so many layers that these are counted.
-const DEEP_SURFACE_FACES: u32 = 2 * GROUP_LAYERS;
+/// A mesh is not cut further than this.
+const MAX_PARTS: usize = 64;
+/// The layers of surfaces with more faces are counted.
+const DEEP_SURFACE_FACES: u32 = 16;
 /// Layers set aside for one connected surface that is not convex.
 const BENT_SURFACE_LAYERS: u32 = 8;
 
@@ -38,36 +38,84 @@ impl Part {
     }
 }
 
-/// Cuts a mesh into parts of at most [`GROUP_LAYERS`] layers each, or into a single one where [`STENCIL_LAYERS`] do.
+/// Cuts a mesh into parts of at most [`GROUP_LAYERS`] layers each, surfaces that have more of them by themselves among it: the
+/// volume of any triangles is the sum of theirs, wherever they are cut apart.
 pub(super) fn parts(mesh: &Mesh) -> Vec<Part> {
     let edges = Edges::of_mesh(mesh);
     let triangle = |t: u32| [0, 1, 2].map(|i| mesh.indices[3 * t as usize + i]);
     let (surface_of, count) = connected(mesh.triangle_count(), &edges);
     let surfaces = surfaces(mesh, &edges, &surface_of, count);
-    let (part_of, layers) = distribute(surfaces.iter().map(|s| s.layers));
+    let (cut_of, cuts) = cut(mesh, &surface_of, surfaces);
+    let (part_of, layers) = distribute(cuts.iter().map(|s| s.layers));
     let mut parts: Vec<Part> = layers.iter().map(|&layers| Part { layers, is_convex: true, ..Part::default() }).collect();
-    let mut place = vec![0; surface_of.len()];
-    for (t, &surface) in (0u32..).zip(&surface_of).filter(|(_, s)| **s != NONE) {
-        let part = &mut parts[part_of[surface as usize]];
+    let mut place = vec![0; cut_of.len()];
+    let part_of = |t: u32| part_of[cut_of[t as usize] as usize];
+    for (t, &cut) in (0u32..).zip(&cut_of).filter(|(_, s)| **s != NONE) {
+        let part = &mut parts[part_of(t)];
         place[t as usize] = part.triangles.len() as u32;
         let [a, b, c] = triangle(t);
-        part.triangles.push([a, b, c, surfaces[surface as usize].winding]);
-        part.is_convex &= surfaces[surface as usize].is_convex;
+        part.triangles.push([a, b, c, cuts[cut as usize].winding]);
+        part.is_convex &= cuts[cut as usize].is_convex;
     }
+    let mut sorted = Vec::new();
     for edge in &edges.edges {
-        let incidences = &edges.incidences[edge.first as usize..][..edge.count as usize];
-        let part = &mut parts[part_of[surface_of[(incidences[0] >> 1) as usize] as usize]];
-        part.edges.push([edge.a, edge.b, part.incidences.len() as u32, edge.count]);
-        part.incidences.extend(incidences.iter().map(|i| place[(i >> 1) as usize] << 1 | (i & 1)));
+        sorted.clear();
+        sorted.extend_from_slice(&edges.incidences[edge.first as usize..][..edge.count as usize]);
+        sorted.sort_by_key(|i| part_of(i >> 1));
+        for incidences in sorted.chunk_by(|i, j| part_of(i >> 1) == part_of(j >> 1)) {
+            let part = &mut parts[part_of(incidences[0] >> 1)];
+            part.edges.push([edge.a, edge.b, part.incidences.len() as u32, incidences.len() as u32]);
+            part.incidences.extend(incidences.iter().map(|i| place[(i >> 1) as usize] << 1 | (i & 1)));
+        }
     }
     parts
+}
+
+/// Cuts surfaces of more than [`GROUP_LAYERS`] layers into runs of as many triangles, or of more where these would be too many.
+fn cut(mesh: &Mesh, surface_of: &[u32], surfaces: Vec<Surface>) -> (Vec<u32>, Vec<Surface>) {
+    let is_deep = |s: &Surface| s.layers > GROUP_LAYERS;
+    if !surfaces.iter().any(is_deep) {
+        return (surface_of.to_vec(), surfaces);
+    }
+    let mut faces = vec![0u32; surfaces.len()];
+    surface_of.iter().filter(|s| **s != NONE).for_each(|s| faces[*s as usize] += 1);
+    let (mut cuts, mut deep): (Vec<Surface>, Vec<Deep>) = (Vec::new(), Vec::new());
+    // First cut of each surface, triangles of a cut, and triangles met so far.
+    let mut runs = Vec::new();
+    for (surface, &faces) in surfaces.iter().zip(&faces) {
+        let run = if is_deep(surface) { GROUP_LAYERS.max(faces.div_ceil(MAX_PARTS as u32)) } else { u32::MAX };
+        runs.push((cuts.len() as u32, run, 0u32));
+        for _ in 0..faces.div_ceil(run) {
+            if run != u32::MAX && run > GROUP_LAYERS {
+                deep.push(Deep { surface: cuts.len() as u32, is_closed: surface.winding != 0 });
+            }
+            cuts.push(Surface { layers: surface.layers.min(run), is_convex: surface.is_convex && run == u32::MAX, ..*surface });
+        }
+    }
+    let cut_of: Vec<u32> = surface_of
+        .iter()
+        .map(|&surface| {
+            if surface == NONE {
+                return NONE;
+            }
+            let (first, run, met) = &mut runs[surface as usize];
+            *met += 1;
+            *first + (*met - 1) / *run
+        })
+        .collect();
+    if !deep.is_empty() {
+        for (deep, layers) in deep.iter().zip(layers::counted(mesh, &cut_of, &deep)) {
+            cuts[deep.surface as usize].layers = layers.max(1);
+        }
+    }
+    (cut_of, cuts)
 }
 
 /// The surface of a degenerate triangle.
 const NONE: u32 = u32::MAX;
 
 /// Triangles connected through edges.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 struct Surface {
     /// As in [`Part::triangles`].
     winding: u32,
@@ -199,7 +247,7 @@ fn distribute(layers: impl Iterator<Item = u32>) -> (Vec<usize>, Vec<u32>) {
         part_of.push(part_layers.len() - 1);
     }
     let total: u32 = part_layers.iter().sum();
-    if part_layers.len() > 1 && (total <= STENCIL_LAYERS || part_layers.len() > MAX_PARTS) {
+    if part_layers.len() > MAX_PARTS {
         return (vec![0; part_of.len()], vec![total]);
     }
     (part_of, part_layers)
@@ -236,8 +284,8 @@ mod tests {
                 ..Mesh::default()
             };
             let layers: Vec<u32> = parts(&mesh).iter().map(|p| p.layers).collect();
-            let expected = if 2 * folds > DEEP_SURFACE_FACES { folds } else { BENT_SURFACE_LAYERS };
-            assert_eq!(layers, [expected], "{folds} folds");
+            assert!(layers.iter().all(|l| *l <= GROUP_LAYERS), "{folds} folds: {layers:?}");
+            assert!((folds..=3 * folds).contains(&layers.iter().sum()), "{folds} folds: {layers:?}");
         }
     }
 
@@ -258,9 +306,16 @@ mod tests {
             ("open", boxes(1, &OUTWARD[..30]), vec![10], 0, vec![8]),
             ("dented", dented, vec![12], 1, vec![8]),
             ("degenerate triangles are dropped", boxes(1, &[0, 0, 1, 0, 1, 2]), vec![1], 0, vec![1]),
-            ("many", boxes(200, &OUTWARD), vec![2400], 1, vec![200]),
+            ("many", boxes(200, &OUTWARD), vec![127 * 12, 73 * 12], 1, vec![127, 73]),
             ("too many for one stencil", boxes(300, &OUTWARD), vec![127 * 12, 127 * 12, 46 * 12], 1, vec![127, 127, 46]),
-            ("loose leaves", boxes(800, &OUTWARD[..6]), vec![1600], 0, vec![1600]),
+            (
+                "loose leaves",
+                boxes(800, &OUTWARD[..6]),
+                [vec![126; 12], vec![88]].concat(),
+                0,
+                [vec![126; 12], vec![88]].concat(),
+            ),
+            ("more than can be cut", boxes(5000, &OUTWARD[..6]), vec![10_000], 0, vec![10_000]),
         ];
         for (name, mesh, triangles, winding, layers) in rows {
             let parts = parts(&mesh);

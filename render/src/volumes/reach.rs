@@ -7,23 +7,28 @@ use umbriel_scene::Aabb;
 /// How far the volume of one caster is thrown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reach {
-    /// Metres of parallel light; of a lamp the multiple of a vertex' distance from it. May be infinite.
+    /// Metres of parallel light; of a lamp the multiple of a vertex' distance from it. May be infinite. Beyond, nothing
+    /// receives.
     pub(super) times: f64,
+    /// How far it is drawn: parallel light that nothing else bounds goes on without end, where each side is one triangle
+    /// instead of two, and no end needs a cap.
+    pub(super) drawn: f64,
     /// The plane behind which all of the end lies and in front of which all receivers are; none where an end short of
     /// infinity may be in front of a receiver.
     pub(super) behind: Option<DVec4>,
 }
 
 impl Reach {
-    pub(super) const INFINITE: Reach = Reach { times: f64::INFINITY, behind: None };
+    pub(super) const INFINITE: Reach = Reach { times: f64::INFINITY, drawn: f64::INFINITY, behind: None };
 
-    pub(super) fn is_infinite(&self) -> bool {
-        self.times == f64::INFINITY
+    /// Does what is drawn end?
+    pub(super) fn has_end(&self) -> bool {
+        self.drawn != f64::INFINITY
     }
 
     /// For the shader; 0 is infinity.
     pub(super) fn w(&self) -> f32 {
-        (1.0 / self.times) as f32
+        (1.0 / self.drawn) as f32
     }
 }
 
@@ -43,7 +48,8 @@ pub(super) fn reach(light: &VolumeLight, bounds: &Aabb, receivers: &Aabb) -> Opt
     let mut found = Reach::INFINITE;
     let mut end = |times: f64, behind: Option<DVec4>| {
         if times < found.times {
-            found = Reach { times, behind };
+            let drawn = if toward.w == 0.0 && behind.is_some() { f64::INFINITY } else { times };
+            found = Reach { times, drawn, behind };
         }
     };
     let fitted = settings.fitted && !receivers.is_empty();

@@ -4,6 +4,7 @@
 
 const EVERY_TRIANGLE = 1u;
 const MIRRORED = 2u;
+const POINTED = 4u;
 
 struct Caster {
     world_from_object: mat4x4<f32>,

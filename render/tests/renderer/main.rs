@@ -2,6 +2,7 @@
 
 mod author;
 mod contact;
+mod contours;
 mod deformation;
 mod layouts;
 mod lights;

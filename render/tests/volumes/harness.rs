@@ -3,7 +3,7 @@
 use crate::shapes::Thing;
 use glam::{Mat4, Vec4};
 use umbriel_render::volumes::{
-    Depth, Sight, Surface, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats,
+    Depth, Seen, Sight, Surface, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats,
 };
 use umbriel_scene::{Aabb, View, VolumeSettings};
 use wgpu::util::DeviceExt;
@@ -164,7 +164,7 @@ impl Gpu {
         light: VolumeLight,
         view: &View,
     ) -> (Vec<u32>, VolumeStats, VolumeDraws) {
-        let mut view_data = [0f32; 60];
+        let mut view_data = [0f32; 68];
         let clip_from_view = match self.depth {
             Depth::Reversed => view.frustum.clip_from_view(),
             Depth::Conventional => view.frustum.clip_from_view_conventional((-22f32).exp2()),
@@ -180,7 +180,17 @@ impl Gpu {
         let all = casters.iter().chain(receivers).map(|l| l.caster().bounds_in_world);
         let receives = if all.clone().any(|b| b.is_empty()) { Aabb::EMPTY } else { all.fold(Aabb::EMPTY, Aabb::union) };
         let job = VolumeJob { light, casters: casters.iter().map(Loaded::caster).collect(), receivers: receives };
-        let sight = Sight::new(view, receives);
+        let mut sight = Sight::new(view, receives);
+        if !receives.is_empty() {
+            // Surfaces are drawn from both sides.
+            let hiding = casters.iter().chain(receivers).flat_map(|l| {
+                let (mesh, place) = (&l.thing.mesh, l.thing.world_from_object);
+                let corner = move |i: &u32| place.transform_point3(mesh.positions[*i as usize]);
+                mesh.indices.chunks_exact(3).map(move |t| [corner(&t[0]), corner(&t[1]), corner(&t[2])])
+            });
+            let receivers = casters.iter().chain(receivers).map(|l| l.caster().bounds_in_world).collect();
+            sight = sight.with(Seen { receivers, hiding: hiding.collect() });
+        }
         let stats = self.pass.prepare(&self.device, &mut encoder, &[job]);
         self.surfaces(&mut encoder, casters.iter().chain(receivers), &view_group, &target_view);
         let draws = {

@@ -35,7 +35,10 @@ pub use material::{
 };
 pub use mesh::{Mesh, MeshError, MorphTarget, Topology};
 pub use reduce::{ReduceError, ReducedMesh, reduce};
-pub use scene::{Background, Drawable, Film, Fog, FogKind, Pose, Scene, StandIn, StencilGroup, StencilMode};
+pub use scene::{
+    Background, ContourGroup, ContourStyle, Drawable, Film, Fog, FogKind, Pose, Samples, Scene, StandIn, StencilGroup,
+    StencilMode,
+};
 pub use score::{Score, difference, score};
 pub use tangents::tangents;
 pub use trace::{Mask, MaskError, PenumbraScore, Shares, TraceError, TraceOptions, Tracer, trace_visibility};

@@ -21,6 +21,8 @@ pub struct Scene {
     pub shadow_textures: Vec<Option<usize>>,
     /// Groups of casters made by `StencilShadow` nodes.
     pub stencil_groups: Vec<StencilGroup>,
+    /// Shapes that are drawn with their contours. Of a shape in several of them, the last counts.
+    pub contours: Vec<ContourGroup>,
     /// Light that reaches every surface from everywhere, linear RGB.
     pub ambient: Vec3,
     /// What is behind everything.
@@ -29,6 +31,8 @@ pub struct Scene {
     pub fog: Option<Fog>,
     /// Factor of the linear picture before it is encoded; 1 leaves it.
     pub exposure: f32,
+    /// How finely views are sampled.
+    pub samples: Samples,
     /// Texture memory for all shadow maps, bytes. Where it is short, the least important lights get smaller maps.
     pub map_memory_bytes: u64,
     /// Where this scene's space is in a world that moves, for shaders that draw patterns in the world.
@@ -46,13 +50,40 @@ impl Default for Scene {
             projectors: Vec::new(),
             shadow_textures: Vec::new(),
             stencil_groups: Vec::new(),
+            contours: Vec::new(),
             ambient: Vec3::ZERO,
             background: Background::default(),
             fog: None,
             exposure: 1.0,
+            samples: Samples::default(),
             map_memory_bytes: 1 << 30,
             world_from_room: Mat4::IDENTITY,
         }
+    }
+}
+
+/// Samples of depth, stencil and colour per pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Samples {
+    /// Edges are steps.
+    One,
+    /// Edges of shapes and of shadow volumes are smooth.
+    #[default]
+    Four,
+}
+
+impl Samples {
+    /// Their number.
+    pub fn count(self) -> u32 {
+        match self {
+            Samples::One => 1,
+            Samples::Four => 4,
+        }
+    }
+
+    /// Those of a number, where there are such.
+    pub fn of(count: u32) -> Option<Samples> {
+        [Samples::One, Samples::Four].into_iter().find(|s| s.count() == count)
     }
 }
 
@@ -141,6 +172,29 @@ pub enum StencilMode {
     Additive,
     /// The picture is tinted by a film where the group's shadow falls; the light itself shines everywhere.
     Modulative(Film),
+}
+
+/// Shapes and the lines that are drawn over them (001 section 4.3).
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContourGroup {
+    /// Places in [`Scene::drawables`].
+    pub drawables: Vec<usize>,
+    /// How lines look.
+    pub style: ContourStyle,
+}
+
+/// Lines over the edges of a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContourStyle {
+    /// Linear RGB.
+    pub color: Vec3,
+    /// Width of contours, pixels: edges between a triangle that the eye sees from its front and one that it sees from behind,
+    /// and open edges; 0 draws none.
+    pub line_px: f32,
+    /// Width of the stroke around the silhouette, pixels, all of it outside of the shape; 0 draws none.
+    pub outline_px: f32,
+    /// Edges whose triangles turn by more than this are contours too, radians; infinite for none.
+    pub crease_rad: f32,
 }
 
 /// The half-transparent film of the paper's `ShadowQuad`.

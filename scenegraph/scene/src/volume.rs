@@ -12,6 +12,9 @@ pub struct VolumeSettings {
     pub silhouettes: Silhouettes,
     /// Leaves out volumes, caps and parts of the screen that cannot show a shadow (001 section 5.2).
     pub culling: bool,
+    /// Leaves out parts of volumes, tile by tile, that lie before or behind everything that is seen and receives (001 section
+    /// 5.3). Only with `culling`.
+    pub depth_bounds: bool,
     /// Volumes end behind the last surface that receives, instead of at infinity.
     pub fitted: bool,
     /// Shadows end this far behind what casts them, metres; infinite where unlimited. A lamp's volumes widen, so it holds
@@ -48,6 +51,7 @@ impl Default for VolumeSettings {
             counting: VolumeCounting::default(),
             silhouettes: Silhouettes::default(),
             culling: true,
+            depth_bounds: true,
             fitted: true,
             length: f32::INFINITY,
             lower_plane: None,

@@ -17,6 +17,8 @@ pub(super) struct Dirty {
     /// Background, Fog or Environment changed.
     pub(super) environment: bool,
     pub(super) stencils: bool,
+    /// A Contours node changed.
+    pub(super) contours: bool,
     pub(super) viewpoints: bool,
     /// Transforms, Switches and LODs that were written.
     pub(super) moved: BTreeSet<NodeId>,
@@ -31,7 +33,7 @@ pub(super) struct Dirty {
 
 impl Dirty {
     pub(super) fn is_empty(&self) -> bool {
-        let flags = [self.structure, self.room, self.head, self.environment, self.stencils, self.viewpoints];
+        let flags = [self.structure, self.room, self.head, self.environment, self.stencils, self.contours, self.viewpoints];
         !flags.contains(&true) && self.moved.is_empty() && self.shapes.is_empty() && self.lights.is_empty()
     }
 
@@ -107,6 +109,7 @@ impl Extractor {
             Role::User => dirty.head = true,
             Role::Environment => dirty.environment = true,
             Role::ShadowQuad => dirty.stencils = true,
+            Role::Contours => dirty.contours = true,
             Role::ShadowMap => dirty.lights.extend(self.lights.iter().map(|l| l.node)),
             Role::Group | Role::Inert => {}
         }

@@ -140,6 +140,7 @@ fn volume_settings(read: &Reader<'_>, check: &mut Check<'_>) -> VolumeSettings {
         counting: [VolumeCounting::Auto, VolumeCounting::ZFail][usize::from(read.choice("volume_counting") == 1)],
         silhouettes: [Silhouettes::Compute, Silhouettes::Quads][usize::from(read.choice("volume_silhouettes") == 1)],
         culling: read.get("volume_culling"),
+        depth_bounds: read.get("volume_depth_bounds"),
         fitted: read.get("volume_fitted"),
         length: check.finite("volume_length", read.get("volume_length"), f32::INFINITY, |l: &f32| *l > 0.0),
         lower_plane: floor.is_finite().then(|| Vec3::Y.extend(-floor)),

@@ -5,6 +5,7 @@
 //! changed `children` compile the list anew. Everything is extracted in ROOM space: the displays stand still and the
 //! world moves (000 section 4.1), lights included.
 
+mod contours;
 mod dirty;
 mod drawable;
 mod files;
@@ -90,6 +91,7 @@ pub struct Extractor {
     lights: Vec<LightEntry>,
     lods: Vec<u32>,
     groups: Vec<u32>,
+    contours: Vec<u32>,
     viewpoint_places: Vec<u32>,
     viewpoints: Vec<Viewpoint>,
     resources: Resources,
@@ -132,6 +134,7 @@ impl Extractor {
             lights: Vec::new(),
             lods: Vec::new(),
             groups: Vec::new(),
+            contours: Vec::new(),
             viewpoint_places: Vec::new(),
             viewpoints: Vec::new(),
             resources,
@@ -187,6 +190,9 @@ impl Extractor {
         self.update_projections(graph, scene);
         if dirty.structure || dirty.stencils || touched.groups || relisted || casting {
             scene.stencil_groups = self.stencil_groups(graph, scene);
+        }
+        if dirty.structure || dirty.contours {
+            contours::read(graph, &self.instances, &self.contours, scene);
         }
         if touched.viewpoints || dirty.viewpoints {
             self.viewpoints = read_viewpoints(graph, &self.instances, &self.viewpoint_places, &self.room);
@@ -295,7 +301,7 @@ impl Extractor {
 
     /// Lists lights, LODs, groups and viewpoints of a newly compiled list.
     fn list_leaves(&mut self) {
-        for list in [&mut self.lods, &mut self.groups, &mut self.viewpoint_places] {
+        for list in [&mut self.lods, &mut self.groups, &mut self.contours, &mut self.viewpoint_places] {
             list.clear();
         }
         self.lights.clear();
@@ -303,6 +309,7 @@ impl Extractor {
             match instance.role {
                 Role::Lod => self.lods.push(place),
                 Role::Stencil => self.groups.push(place),
+                Role::Contours => self.contours.push(place),
                 Role::Viewpoint => self.viewpoint_places.push(place),
                 Role::Light => {
                     instance.slot = self.lights.len() as u32;

@@ -11,6 +11,7 @@ pub(super) enum Role {
     Group,
     Transform,
     Stencil,
+    Contours,
     Switch,
     Lod,
     Shape,
@@ -31,7 +32,7 @@ impl Role {
     /// Has a place in the world.
     pub(super) fn is_placed(self) -> bool {
         use Role::*;
-        matches!(self, Group | Transform | Stencil | Switch | Lod | Shape | Light | Viewpoint)
+        matches!(self, Group | Transform | Stencil | Contours | Switch | Lod | Shape | Light | Viewpoint)
     }
 }
 
@@ -68,6 +69,7 @@ impl Types {
             "Group" => Role::Group,
             "Transform" => Role::Transform,
             "StencilShadow" => Role::Stencil,
+            "Contours" => Role::Contours,
             "Switch" => Role::Switch,
             "LOD" => Role::Lod,
             "Shape" => Role::Shape,

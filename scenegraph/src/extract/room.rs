@@ -3,12 +3,12 @@
 use super::instance::{Instances, unit};
 use super::problem::Problems;
 use super::read::{Reader, label};
-use crate::nodes::environment::{AMBIENT, HORIZON, NADIR, SHADOW_MEMORY_MIB, ZENITH};
+use crate::nodes::environment::{AMBIENT, HORIZON, NADIR, SAMPLES, SHADOW_MEMORY_MIB, ZENITH};
 use glam::{Mat4, Quat, Vec3};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use umbriel_fields::{Graph, NodeId};
-use umbriel_scene::{Background, Fog, FogKind, Scene};
+use umbriel_scene::{Background, Fog, FogKind, Samples, Scene};
 
 /// Nodes that are found by their type, wherever they stand. The smallest id of a type counts.
 #[derive(Default)]
@@ -82,7 +82,7 @@ pub(super) fn read_environment(graph: &Graph, globals: &Globals, room: &Room, pr
         let made = || Fog { color: color(&fog, "color", Vec3::ONE), kind, visibility_range: range / room.world_per_room };
         (range.is_finite() && range > 0.0).then(made)
     });
-    (scene.ambient, scene.exposure) = (AMBIENT, 1.0);
+    (scene.ambient, scene.exposure, scene.samples) = (AMBIENT, 1.0, Samples::default());
     scene.map_memory_bytes = (SHADOW_MEMORY_MIB as u64) << 20;
     if let Some(surroundings) = of_type("Environment").next() {
         scene.ambient = color(&surroundings, "ambient", AMBIENT);
@@ -95,6 +95,11 @@ pub(super) fn read_environment(graph: &Graph, globals: &Globals, room: &Room, pr
         let problem = (memory < 1).then(|| format!("{memory} makes no sense here; {SHADOW_MEMORY_MIB} is used"));
         problems.set(graph, surroundings.node, "shadow_memory", problem);
         scene.map_memory_bytes = (if memory < 1 { SHADOW_MEMORY_MIB } else { memory } as u64) << 20;
+        let count: i32 = surroundings.get("samples");
+        let samples = u32::try_from(count).ok().and_then(Samples::of);
+        let problem = samples.is_none().then(|| format!("{count} is neither 1 nor 4; {SAMPLES} is used"));
+        problems.set(graph, surroundings.node, "samples", problem);
+        scene.samples = samples.unwrap_or_default();
     }
 }
 

@@ -11,6 +11,8 @@ pub(crate) const HORIZON: Vec3 = vec3(0.10, 0.13, 0.18);
 pub(crate) const NADIR: Vec3 = vec3(0.03, 0.03, 0.03);
 /// Memory of shadow maps where a world says nothing, MiB.
 pub(crate) const SHADOW_MEMORY_MIB: i32 = 1024;
+/// Samples per pixel where a world says nothing.
+pub(crate) const SAMPLES: i32 = 4;
 /// Ambient light where a world says nothing.
 pub(crate) const AMBIENT: Vec3 = vec3(0.08, 0.08, 0.08);
 
@@ -33,6 +35,10 @@ pub(super) fn types() -> Vec<NodeType> {
                 Field::new("shadow_memory", SHADOW_MEMORY_MIB)
                     .unit("MiB")
                     .doc("Texture memory for all shadow maps. Where it is short, the least important lights get smaller maps."),
+            )
+            .field(
+                Field::new("samples", SAMPLES)
+                    .doc("Samples per pixel of every view: 4, or 1, which is faster and has hard edges."),
             ),
     ]
 }

@@ -4,6 +4,7 @@
 //! (`castShadow`, `CastShadow`, `cast_shadow`) is the same name, so only other words are listed as aliases.
 
 mod aim;
+mod contours;
 pub(crate) mod environment;
 mod geometry;
 mod group;
@@ -31,6 +32,7 @@ pub fn node_types() -> Vec<NodeType> {
         skin::types(),
         light::types(),
         stencil::types(),
+        contours::types(),
         environment::types(),
         aim::types(),
         sky::types(),

@@ -1,5 +1,6 @@
 //! Worlds of a few nodes, and what must come out.
 
+mod contours;
 mod cost;
 mod lights;
 mod looks;

@@ -240,6 +240,7 @@ fn settings_of_volumes_are_read_and_follow_the_room() {
     w.set(light, "volume_silhouettes", "quads");
     w.set(light, "volume_culling", false);
     w.set(light, "volume_fitted", false);
+    w.set(light, "volume_depth_bounds", false);
     w.set(light, "volume_length", 3.0f32);
     w.set(light, "volume_floor", -1.0f32);
     w.update();
@@ -248,6 +249,7 @@ fn settings_of_volumes_are_read_and_follow_the_room() {
         counting: VolumeCounting::ZFail,
         silhouettes: Silhouettes::Quads,
         culling: false,
+        depth_bounds: false,
         fitted: false,
         length: 6.0,
         lower_plane: Some(Vec4::new(0.0, 1.0, 0.0, -3.0)),

@@ -1,0 +1,106 @@
+// Contours of a shape as lines (001 section 4.3): every edge is a quad, which the vertex shader pulls apart where the edge is
+// a contour. Concatenated after shaders/view.wgsl and shaders/position.wgsl.
+
+@group(1) @binding(0) var<storage, read> positions: array<f32>;
+@group(1) @binding(1) var<storage, read> triangles: array<vec4<u32>>;
+// Two vertices a and b, place and number of its incidences.
+@group(1) @binding(2) var<storage, read> edges: array<vec4<u32>>;
+// Triangle << 1, plus 1 where the triangle runs from b to a.
+@group(1) @binding(3) var<storage, read> incidences: array<u32>;
+
+struct Contour {
+    world_from_object: mat4x4<f32>,
+    color: vec3<f32>,
+    // Half the width of thin lines, pixels.
+    line_px: f32,
+    // The same of strokes around the silhouette, whose inner half is not drawn.
+    outline_px: f32,
+    // Cosine of the angle from which on an edge is a crease.
+    crease_cos: f32,
+};
+
+@group(2) @binding(0) var<uniform> contour: Contour;
+
+// Lines lie on the surface whose edges they are: so much nearer, as a share of the distance.
+const NEARER = 5e-4;
+const NOWHERE = vec4<f32>(2.0, 2.0, 0.5, 1.0);
+
+fn corner_in_world(i: u32) -> vec3<f32> {
+    let p = vec3<f32>(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]);
+    return world_from_vertex(contour.world_from_object, p).xyz;
+}
+
+fn normal_of(t: vec4<u32>) -> vec3<f32> {
+    let a = corner_in_world(t.x);
+    return cross(corner_in_world(t.y) - a, corner_in_world(t.z) - a);
+}
+
+// The signed sum of the sides that the eye sees, as shadow volumes count them: 0 where what is seen goes on across the edge,
+// whatever the winding of the triangles. Open edges always count.
+fn is_contour(e: vec4<u32>) -> bool {
+    var sum = 0;
+    for (var k = e.z; k < e.z + e.w; k++) {
+        let t = triangles[incidences[k] >> 1u];
+        let d = dot(normal_of(t), view.eye_in_world.xyz - corner_in_world(t.x));
+        let facing = select(select(0, -1, d < 0.0), 1, d > 0.0);
+        sum += select(facing, -facing, (incidences[k] & 1u) != 0u);
+    }
+    if sum != 0 {
+        return true;
+    }
+    if e.w != 2u || contour.crease_cos < -1.0 {
+        return false;
+    }
+    let one = incidences[e.z];
+    let other = incidences[e.z + 1u];
+    // Of two that run alike along the edge, one is wound the other way round.
+    let turned = select(1.0, -1.0, (one & 1u) == (other & 1u));
+    let a = normal_of(triangles[one >> 1u]);
+    let b = turned * normal_of(triangles[other >> 1u]);
+    return dot(a, b) < contour.crease_cos * length(a) * length(b);
+}
+
+fn pulled(vertex: u32, edge: u32, half_px: f32) -> vec4<f32> {
+    let e = edges[edge];
+    if half_px <= 0.0 || !is_contour(e) {
+        return NOWHERE;
+    }
+    var p = clip_from_point(view.clip_from_world, vec4<f32>(corner_in_world(e.x), 1.0));
+    var q = clip_from_point(view.clip_from_world, vec4<f32>(corner_in_world(e.y), 1.0));
+    // In front of the near plane z is above w.
+    let p_ahead = p.w - p.z;
+    let q_ahead = q.w - q.z;
+    if p_ahead <= 0.0 && q_ahead <= 0.0 {
+        return NOWHERE;
+    }
+    if p_ahead < 0.0 {
+        p = mix(p, q, p_ahead / (p_ahead - q_ahead));
+    } else if q_ahead < 0.0 {
+        q = mix(q, p, q_ahead / (q_ahead - p_ahead));
+    }
+    let pixels = 0.5 * view.window.zw;
+    let way = (q.xy / q.w - p.xy / p.w) * pixels;
+    let along = select(vec2<f32>(1.0, 0.0), normalize(way), dot(way, way) > 1e-12);
+    // Square ends, so that lines join.
+    let is_q = vertex == 1u || vertex == 2u || vertex == 4u;
+    let side = select(-1.0, 1.0, vertex == 2u || vertex > 3u);
+    let offset = vec2<f32>(-along.y, along.x) * side + along * select(-1.0, 1.0, is_q);
+    var at = select(p, q, is_q);
+    at = vec4<f32>(at.xy + offset * half_px / pixels * at.w, min(at.z * (1.0 + NEARER), at.w), at.w);
+    return at;
+}
+
+@vertex
+fn line(@builtin(vertex_index) vertex: u32, @builtin(instance_index) edge: u32) -> @builtin(position) vec4<f32> {
+    return pulled(vertex, edge, contour.line_px);
+}
+
+@vertex
+fn outline(@builtin(vertex_index) vertex: u32, @builtin(instance_index) edge: u32) -> @builtin(position) vec4<f32> {
+    return pulled(vertex, edge, contour.outline_px);
+}
+
+@fragment
+fn inked() -> @location(0) vec4<f32> {
+    return vec4<f32>(contour.color, 1.0);
+}

@@ -1,0 +1,76 @@
+//! Views side by side in one target.
+//!
+//! Small views cost more in beginnings and ends than in pixels: clearing, resolving and waiting for what is read next. So
+//! neighbours share a target of at most the pixels of one large view, and these are paid once.
+
+/// Pixels up to which views come together.
+const MOST_PIXELS: u64 = 1920 * 1080;
+
+/// A target of the frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Sheet {
+    pub(crate) size: [u32; 2],
+    /// Number of its views, which follow each other in the frame's list.
+    pub(crate) views: usize,
+    is_full: bool,
+}
+
+/// The targets of a frame, in the order in which they are drawn.
+#[derive(Debug, Default)]
+pub(crate) struct Sheets(pub(crate) Vec<Sheet>);
+
+impl Sheets {
+    /// Left and top of the next view in its sheet. `is_alone` gives it one of its own; `widest` is what the device takes.
+    pub(crate) fn place(&mut self, [width, height]: [u32; 2], is_alone: bool, widest: u32) -> [u32; 2] {
+        let last = self.0.last_mut().filter(|sheet| {
+            let wide = u64::from(sheet.size[0]) + u64::from(width);
+            !is_alone
+                && !sheet.is_full
+                && sheet.size[1] == height
+                && wide <= u64::from(widest)
+                && wide * u64::from(height) <= MOST_PIXELS
+        });
+        let Some(sheet) = last else {
+            self.0.push(Sheet { size: [width, height], views: 1, is_full: is_alone });
+            return [0, 0];
+        };
+        let left = sheet.size[0];
+        sheet.size[0] += width;
+        sheet.views += 1;
+        [left, 0]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_share_a_target() {
+        /// Name, size of each view and whether it is alone, size and views of each sheet.
+        type Row = (&'static str, &'static [([u32; 2], bool)], &'static [([u32; 2], usize)]);
+        let rows: [Row; 6] = [
+            ("seven channels", &[([320, 256], false); 7], &[([2240, 256], 7)]),
+            ("large ones", &[([1920, 1080], false); 2], &[([1920, 1080], 1); 2]),
+            ("of two heights", &[([64, 64], false), ([64, 32], false), ([64, 32], false)], &[([64, 64], 1), ([128, 32], 2)]),
+            ("one alone", &[([64, 64], false), ([64, 64], true), ([64, 64], false)], &[([64, 64], 1); 3]),
+            ("as wide as can be", &[([3000, 16], false); 3], &[([6000, 16], 2), ([3000, 16], 1)]),
+            ("none", &[], &[]),
+        ];
+        for (name, views, expected) in rows {
+            let mut sheets = Sheets::default();
+            let places: Vec<_> = views.iter().map(|(size, alone)| sheets.place(*size, *alone, 8192)).collect();
+            let found: Vec<_> = sheets.0.iter().map(|s| (s.size, s.views)).collect();
+            assert_eq!(found, expected, "{name}");
+            let mut next = places.into_iter().zip(views);
+            for sheet in &sheets.0 {
+                let mut left = 0;
+                for (place, (size, _)) in next.by_ref().take(sheet.views) {
+                    assert_eq!(place, [left, 0], "{name}");
+                    left += size[0];
+                }
+                assert_eq!(left, sheet.size[0], "{name}");
+            }
+        }
+    }
+}
