@@ -85,9 +85,11 @@ fn pulled(vertex: u32, edge: u32, half_px: f32) -> vec4<f32> {
     let is_q = vertex == 1u || vertex == 2u || vertex == 4u;
     let side = select(-1.0, 1.0, vertex == 2u || vertex > 3u);
     let offset = vec2<f32>(-along.y, along.x) * side + along * select(-1.0, 1.0, is_q);
-    var at = select(p, q, is_q);
-    at = vec4<f32>(at.xy + offset * half_px / pixels * at.w, min(at.z * (1.0 + NEARER), at.w), at.w);
-    return at;
+    let at = select(p, q, is_q);
+    // Depth goes on beyond the ends as between them, where it is linear over the picture.
+    let depth_per_px = (q.z / q.w - p.z / p.w) / max(length(way), 1.0);
+    let depth = at.z / at.w + depth_per_px * half_px * select(-1.0, 1.0, is_q);
+    return vec4<f32>(at.xy + offset * half_px / pixels * at.w, clamp(depth * (1.0 + NEARER), 0.0, 1.0) * at.w, at.w);
 }
 
 @vertex

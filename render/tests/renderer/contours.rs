@@ -46,7 +46,7 @@ fn lines_lie_where_they_should() {
         // The far edge of the lower box runs below the upper one.
         ("what is in front hides strokes", scene(two(), INK), &above, &[(52, 60), (52, 140)], &[(52, 100), (56, 100)]),
         ("edges within are none", scene(cube(), thin), &corner, &[], &[(100, 100), (100, 112)]),
-        ("but creases are", scene(cube(), creased), &corner, &[(100, 112)], &[(85, 112)]),
+        ("but creases are", scene(cube(), creased), &corner, &[(100, 125)], &[(85, 125)]),
         ("nothing", Scene { contours: vec![], ..scene(one(), INK) }, &above, &[], &[(72, 100), (74, 100)]),
     ];
     let mut shooter = Shooter::new();
