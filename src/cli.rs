@@ -34,6 +34,11 @@ pub(crate) enum Command {
     /// One map of a spot light, one per cascade of a directional light from the finest on, six of a point light
     /// (+x -x +y -y +z -z), side by side.
     ShadowMap(ShadowMap),
+    /// Runs a world and saves its nodes, values and routes, for `run` to go on with
+    ///
+    /// The file lies beside the world's script and pictures, which are found from there. What node types of the script do goes on;
+    /// handlers of the script itself are not saved.
+    Save(Save),
     /// Plays a recording and compares every frame with what was recorded
     ///
     /// Exit status: 0 all frames are the same bit by bit, 2 they differ or the recording is cut off, 1 it cannot be played.
@@ -75,7 +80,7 @@ pub(crate) enum Command {
 
 #[derive(Args, Debug)]
 pub(crate) struct Run {
-    /// A world (.rhai) or a model (.gltf, .glb)
+    /// A world (.rhai, or saved .umbriel) or a model (.gltf, .glb)
     pub(crate) path: PathBuf,
     /// Draw to PNG files instead of windows
     #[arg(long)]
@@ -110,6 +115,24 @@ pub(crate) struct Run {
     /// Record the session to this file, for `replay` and `explain`
     #[arg(long)]
     pub(crate) record: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Save {
+    /// A world (.rhai, .umbriel) or a model (.gltf, .glb)
+    pub(crate) path: PathBuf,
+    /// The file to write (.umbriel); otherwise the world's name
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// Frames to run before
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) frames: u32,
+    /// Frames per second of the world's time
+    #[arg(long, default_value_t = 60.0, value_parser = positive)]
+    pub(crate) fps: f64,
+    /// Write bytes instead of text: smaller, quicker to read, not to be edited
+    #[arg(long)]
+    pub(crate) binary: bool,
 }
 
 #[derive(Args, Debug)]

@@ -10,6 +10,7 @@ mod model;
 mod nodes;
 mod png;
 mod replay;
+mod save;
 mod scene_file;
 mod session;
 mod shadow_error;
@@ -46,6 +47,7 @@ fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Run(args) if args.headless => headless::run(args),
         Command::Run(args) => window::run(args).map(|()| 0),
+        Command::Save(args) => save::run(args),
         Command::ShadowError(args) => shadow_error::run(args),
         Command::ShadowMap(args) => shadow_map::run(args),
         Command::Replay(args) => replay::run(args),

@@ -10,13 +10,13 @@ use umbriel_displays::rig::{Rig, Wanted};
 use umbriel_fields::{Graph, NodeId};
 use umbriel_scene::{Aabb, Picture, Samples, Scene};
 use umbriel_scenegraph::{Extractor, Viewpoint};
-use umbriel_scripts::World;
+use umbriel_scripts::{SaveForm, World};
 
 /// Why there is nothing to show.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum OpenError {
     /// The file's name does not say what it is.
-    #[error("{}: neither a world (.rhai) nor a model (.gltf, .glb)", .0.display())]
+    #[error("{}: neither a world (.rhai), a saved one (.umbriel), nor a model (.gltf, .glb)", .0.display())]
     Kind(PathBuf),
     /// The script is wrong.
     #[error(transparent)]
@@ -28,6 +28,9 @@ pub(crate) enum OpenError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
 }
+
+/// Extension of saved worlds.
+pub(crate) const SAVED: &str = "umbriel";
 
 /// A running world with its flat scene.
 pub(crate) struct Session {
@@ -53,6 +56,7 @@ impl Session {
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         let world = match extension.as_str() {
             "rhai" => World::load_file(path)?,
+            SAVED => World::open_save(path)?,
             "gltf" | "glb" => {
                 let mut world = World::new();
                 model::show(world.graph_mut(), path)?;
@@ -128,6 +132,14 @@ impl Session {
         if let Some(Err(error)) = self.recording.as_mut().map(|r| r.frame(self.source.graph_mut())) {
             self.problems.push(format!("the recording ends here: {error}"));
             self.recording = None;
+        }
+    }
+
+    /// The world as a file; None for a recording.
+    pub(crate) fn save(&mut self, form: SaveForm) -> Result<Option<Vec<u8>>, umbriel_fields::Error> {
+        match &mut self.source {
+            Source::World(world) => world.save(form).map(Some),
+            Source::Replay(_) => Ok(None),
         }
     }
 

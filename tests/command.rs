@@ -256,6 +256,75 @@ fn frames_are_numbered_and_follow_the_clock() {
     assert!(steps.iter().all(|s| *s > 5.0) && (steps[0] - steps[1]).abs() < 2.0, "{places:?}");
 }
 
+/// Text and bytes: the frame that a saved world shows is the one that the world would have shown.
+#[test]
+fn a_saved_world_goes_on_where_it_was() {
+    let script = format!(
+        "{BACKDROP}\ndefine(\"Lift\", #{{ extends: \"Transform\", fields: #{{ height: 0.0 }}, evaluate: |me, time| {{ me.translation.y = me.height * 2; }} }});\n\
+         let c = make(\"TimeSensor\", #{{ cycle_interval: 2.0, loop: true }});\n\
+         let lift = make(\"Lift\");\n\
+         lift.add(shape(make(\"Box\"), make(\"UnlitMaterial\", #{{ emissive_color: color(1, 1, 1) }})));\n\
+         world.add(lift);\nroute(c, \"fraction_changed\", lift, \"height\");\n"
+    );
+    let (run, whole) = draw("lifted", &script, &["--frames", "4", "--fps", "2"]);
+    assert!(run.ok, "{}", run.stderr);
+    let world = whole.with_extension("rhai");
+    let saved = folder("command").join("lifted.umbriel");
+    let [world, file] = [&world, &saved].map(|p| p.to_str().expect("paths are text"));
+    for form in [&[][..], &["--binary"]] {
+        let run = umbriel(&[&["save", world, "--frames", "3", "--fps", "2"], form].concat());
+        assert!(run.ok && run.stdout.contains("lifted.umbriel"), "{}{}", run.stdout, run.stderr);
+        let out = saved.with_file_name("went_on.png");
+        let out = out.to_str().expect("paths are text");
+        let run = umbriel(&["run", file, "--headless", "--size", "96x64", "--time", "1.5", "--out", out]);
+        assert!(run.ok, "{form:?}: {}", run.stderr);
+        let expected = image::open(whole.with_file_name("lifted.0003.png")).expect("the frame was written").to_rgb8();
+        let first = image::open(whole.with_file_name("lifted.0000.png")).expect("the frame was written").to_rgb8();
+        let found = image::open(out).expect("the frame was written").to_rgb8();
+        assert!(expected == found && expected != first, "{form:?}");
+    }
+}
+
+#[test]
+fn saves_that_are_wrong_say_where_and_the_rest_is_shown() {
+    let (run, picture) = draw("plain", BACKDROP, &[]);
+    assert!(run.ok, "{}", run.stderr);
+    let world = picture.with_extension("rhai");
+    let saved = picture.with_extension("umbriel");
+    let [world, file] = [&world, &saved].map(|p| p.to_str().expect("paths are text"));
+    let save = |form: &[&str]| {
+        assert!(umbriel(&[&["save", world], form].concat()).ok);
+        std::fs::read(file).expect("the save was written")
+    };
+    let (text, bytes) = (String::from_utf8(save(&[])).expect("text"), save(&["--binary"]));
+    let mut damaged = bytes.clone();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    let rows: Vec<(&str, Vec<u8>, &str, bool)> = vec![
+        ("none", b"hello".to_vec(), "plain.umbriel: line 1", false),
+        ("cut text", text.as_bytes()[..text.len() / 2].to_vec(), "plain.umbriel: line", false),
+        ("cut bytes", bytes[..middle].to_vec(), "plain.umbriel: the file is damaged", false),
+        ("damaged bytes", damaged, "plain.umbriel: the file is damaged", false),
+        ("later major", text.replace("(1, 0)", "(2, 0)").into_bytes(), "format version 2.0; versions from 1.0", false),
+        ("later minor", text.replace("(1, 0)", "(1, 9)").into_bytes(), "written as version 1.9", true),
+        ("unknown field", text.replace("\"size\"", "\"sizes\"").into_bytes(), "has no field `sizes`; did you mean `size`?", true),
+        ("unknown type", text.replace("\"Viewpoint\"", "\"Viewpont\"").into_bytes(), "did you mean `Viewpoint`?", true),
+        ("no script", text.replace("plain.rhai", "gone.rhai").into_bytes(), "gone.rhai", true),
+    ];
+    for (name, data, expected, is_shown) in rows {
+        assert!(data != text.as_bytes() && data != bytes, "{name} is no mistake");
+        std::fs::write(&saved, data).expect("a save can be written");
+        let _ = std::fs::remove_file(&picture);
+        let out = picture.to_str().expect("paths are text");
+        let run = umbriel(&["run", file, "--headless", "--size", "96x64", "--out", out]);
+        assert!(!run.ok && run.stderr.contains(expected), "{name}: {}", run.stderr);
+        assert_eq!(picture.exists(), is_shown, "{name}: {}", run.stderr);
+        println!("{name}: {}", run.stderr.trim());
+    }
+    let run = umbriel(&["save", world, "--out", "out.txt"]);
+    assert!(!run.ok && run.stderr.contains("out.txt: saved worlds are called .umbriel"), "{}", run.stderr);
+}
+
 #[test]
 fn the_doctor_reports_mends_and_says_what_is_wrong() {
     let model = root().join("scripts/worlds/models/ferry.glb");

@@ -13,7 +13,9 @@ use crate::stage::{Handler, Node, Stage};
 /// What the observers of nodes of native types carry, whose `evaluate` a script wrote.
 pub(crate) const BEHAVIOUR: u64 = u64::MAX;
 /// Written in every frame for nodes of native types that are always evaluated, so that they have their turn in order.
-const FRAME_TIME: &str = "frame_time";
+pub(crate) const FRAME_TIME: &str = "frame_time";
+/// Names the script's type, for those who save and open.
+pub(crate) const SCRIPT_TYPE: &str = "script_type";
 
 /// A node type that a script defined.
 #[derive(Clone, Default)]
@@ -104,7 +106,7 @@ impl Stage {
         let made_of = definition.native.as_deref().unwrap_or(&known.name);
         let node = Node(self.write(|graph| graph.create(made_of)).map_err(fault)?);
         if definition.native.is_some() {
-            self.write(|graph| dress(graph, node.0, &definition, definition.is_evaluated(self))).map_err(fault)?;
+            self.write(|graph| dress(graph, node.0, &known.name, &definition, definition.is_evaluated(self))).map_err(fault)?;
             self.behaviours.borrow_mut().insert(node.0, Behaviour { type_name: known.name.to_string(), frame: 0 });
             if definition.always && definition.is_evaluated(self) {
                 self.always.borrow_mut().push(node.0);
@@ -124,7 +126,14 @@ impl Stage {
 }
 
 /// Gives a node of a native type the fields of the script, first values, and observers that call its `evaluate`.
-fn dress(graph: &mut Graph, id: NodeId, definition: &Definition, evaluated: bool) -> Result<(), umbriel_fields::Error> {
+fn dress(
+    graph: &mut Graph,
+    id: NodeId,
+    name: &str,
+    definition: &Definition,
+    evaluated: bool,
+) -> Result<(), umbriel_fields::Error> {
+    graph.add_field(id, Field::new(SCRIPT_TYPE, name).output().doc("The type of the script that it is of."))?;
     for field in &definition.own_fields {
         graph.add_field(id, field.clone())?;
     }

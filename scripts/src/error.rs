@@ -19,6 +19,14 @@ pub enum ScriptError {
         /// What the system said.
         reason: String,
     },
+    /// The file is no saved world, or none that can be read.
+    #[error("{}: {reason}", path.display())]
+    Save {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The script is wrong, or went wrong while it ran.
     #[error("{0}")]
     Script(Problem),
@@ -29,7 +37,7 @@ impl ScriptError {
     pub fn problem(&self) -> Option<&Problem> {
         match self {
             ScriptError::Script(problem) => Some(problem),
-            ScriptError::Unreadable { .. } => None,
+            ScriptError::Unreadable { .. } | ScriptError::Save { .. } => None,
         }
     }
 }

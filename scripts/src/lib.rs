@@ -30,4 +30,5 @@ pub use error::{Problem, ScriptError};
 pub use limits::Limits;
 pub use reference::{FunctionDoc, definitions, functions};
 pub use sharing::{Request, Sharing};
+pub use world::saved::SaveForm;
 pub use world::{Settings, World, shared_graph};

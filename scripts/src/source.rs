@@ -67,7 +67,7 @@ impl Source {
         };
         result.map_err(|error| match error {
             ScriptError::Script(problem) => problem,
-            ScriptError::Unreadable { .. } => unreachable!("a console reads no files"),
+            ScriptError::Unreadable { .. } | ScriptError::Save { .. } => unreachable!("a console reads no files"),
         })
     }
 

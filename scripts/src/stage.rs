@@ -322,6 +322,18 @@ impl Stage {
         Ok(id)
     }
 
+    /// Forgets the nodes and handlers of a run; definitions and functions stay.
+    pub(crate) fn forget_run(&self) {
+        self.on_frame.borrow_mut().clear();
+        self.on_change.borrow_mut().clear();
+        self.behaviours.borrow_mut().clear();
+        self.always.borrow_mut().clear();
+        self.places.borrow_mut().clear();
+        self.problems.borrow_mut().clear();
+        self.field_bytes.borrow_mut().clear();
+        self.field_bytes_sum.set(0);
+    }
+
     /// Stops a handler, even from within itself.
     pub(crate) fn stop(&self, id: u64) {
         self.on_frame.borrow_mut().remove(&id);

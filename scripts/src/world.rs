@@ -1,5 +1,7 @@
 //! A world: the graph, and the script that made it and that it calls.
 
+pub(crate) mod saved;
+
 use std::cell::RefMut;
 use std::collections::{BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
@@ -283,8 +285,10 @@ fn empty(settings: &Settings, folder: Option<&Path>) -> (Graph, Script) {
 /// A graph without script, which knows all node types.
 pub(crate) fn empty_graph() -> Graph {
     let graph = new_graph();
-    if let Err(error) = graph.types().register(expression::node_type()) {
-        tracing::error!("{error}");
+    for node_type in [expression::node_type(), saved::script_type()] {
+        if let Err(error) = graph.types().register(node_type) {
+            tracing::error!("{error}");
+        }
     }
     graph
 }
