@@ -222,7 +222,7 @@ mod tests {
             ("find(\"lift\").translation", "vec3(0, 3, 0)"),
             ("find(\"door\").log", "o"),
             ("find(\"sum\").value", ""),
-            ("find(\"double\").input = 5; find(\"lift\").floor = 2; find(\"door\").open = false;", ""),
+            ("let x = find(\"double\"); x.input = 5; x = find(\"lift\"); x.floor = 2; x = find(\"door\"); x.open = false;", ""),
             ("step", ""),
             ("find(\"double\").output", "10.0"),
             ("find(\"lift\").translation", "vec3(0, 6, 0)"),
