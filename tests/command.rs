@@ -301,7 +301,7 @@ fn saves_that_are_wrong_say_where_and_the_rest_is_shown() {
     let middle = damaged.len() / 2;
     damaged[middle] ^= 1;
     let rows: Vec<(&str, Vec<u8>, &str, bool)> = vec![
-        ("none", b"hello".to_vec(), "plain.umbriel: line 1", false),
+        ("none", b"hello".to_vec(), "plain.umbriel: this is no saved world", false),
         ("cut text", text.as_bytes()[..text.len() / 2].to_vec(), "plain.umbriel: line", false),
         ("cut bytes", bytes[..middle].to_vec(), "plain.umbriel: the file is damaged", false),
         ("damaged bytes", damaged, "plain.umbriel: the file is damaged", false),
