@@ -1,6 +1,7 @@
 //! Storage: one growable vector per field type, so that a route copies between two places of one array.
 
 use crate::kind::for_each_kind;
+use crate::program::Hop;
 use crate::{FieldType, FieldValue, Kind, Revision, Value};
 
 /// No node owns the slot.
@@ -95,6 +96,22 @@ impl<'a, T: FieldValue> Stretch<'a, T> {
         true
     }
 
+    /// Copies from slot to slot what was written after a revision, unless the target was written later, or `compare` and nothing would change.
+    #[inline]
+    fn copy(&mut self, hop: &Hop, before: Revision, revision: Revision) -> bool {
+        let (source, target) = (hop.source as usize - self.first, hop.target as usize - self.first);
+        let written = self.revisions[source];
+        if written <= before || self.revisions[target] >= written {
+            return false;
+        }
+        let value = self.values[source].clone();
+        self.write(hop.target, value, hop.compare, revision)
+    }
+
+    fn reborrow(&mut self) -> Stretch<'_, T> {
+        Stretch { first: self.first, values: self.values, revisions: self.revisions }
+    }
+
     /// Gives away what lies from a slot on.
     fn split_off(&mut self, slot: u32) -> Stretch<'a, T> {
         let length = (slot as usize).saturating_sub(self.first).min(self.values.len());
@@ -129,6 +146,20 @@ macro_rules! columns {
                 Stretches { $(
                     $one_column: self.$one_column.split_off(at.$one_column),
                     $many_column: self.$many_column.split_off(at.$many_column),
+                )* }
+            }
+
+            /// The same for a while.
+            pub(crate) fn reborrow(&mut self) -> Stretches<'_> {
+                Stretches { $($one_column: self.$one_column.reborrow(), $many_column: self.$many_column.reborrow(),)* }
+            }
+
+            /// Copies a value unless it is old or nothing would change; says whether it did.
+            #[inline]
+            pub(crate) fn copy(&mut self, hop: &Hop, before: Revision, revision: Revision) -> bool {
+                match (hop.field_type.kind, hop.field_type.multiple) { $(
+                    (Kind::$one, false) => self.$one_column.copy(hop, before, revision),
+                    (Kind::$one, true) => self.$many_column.copy(hop, before, revision),
                 )* }
             }
 

@@ -5,6 +5,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use slotmap::{Key, SlotMap};
+use smallvec::SmallVec;
 
 use crate::batch::Batches;
 use crate::changes::ChangeLog;
@@ -45,7 +46,7 @@ pub(crate) struct Node {
     pub(crate) node_type: Arc<NodeType>,
     pub(crate) name: Option<Arc<str>>,
     /// By field index: the slot in the column of the field's type, or `FREE` where a dynamic field was removed.
-    pub(crate) slots: Vec<u32>,
+    pub(crate) slots: SmallVec<[u32; 6]>,
     /// Fields beyond the declared ones.
     pub(crate) dynamic: Vec<Option<Field>>,
     /// Routes to its fields and from them; each route knows its place here.
@@ -58,6 +59,22 @@ pub(crate) struct Node {
 }
 
 impl Node {
+    /// A node whose fields have no places yet.
+    pub(crate) fn new(node_type: Arc<NodeType>, created: Revision) -> Self {
+        let (mode, local) = (node_type.mode, node_type.local);
+        Self {
+            node_type,
+            name: None,
+            slots: SmallVec::new(),
+            dynamic: Vec::new(),
+            incoming: Vec::new(),
+            outgoing: Vec::new(),
+            created,
+            mode,
+            local,
+        }
+    }
+
     #[inline]
     pub(crate) fn field(&self, index: u16) -> Option<&Field> {
         let declared = &self.node_type.fields;
@@ -165,18 +182,8 @@ impl Graph {
     pub fn create_of(&mut self, node_type: Arc<NodeType>) -> NodeId {
         let created = self.changes.next();
         let type_of_new = node_type.clone();
-        let (mode, local, fields) = (node_type.mode, node_type.local, node_type.fields.len());
-        let id = self.nodes.insert(Node {
-            node_type,
-            name: None,
-            slots: Vec::with_capacity(fields),
-            dynamic: Vec::new(),
-            incoming: Vec::new(),
-            outgoing: Vec::new(),
-            created,
-            mode,
-            local,
-        });
+        let mode = node_type.mode;
+        let id = self.nodes.insert(Node::new(node_type, created));
         let slot = slot_of(id);
         if self.ids.len() <= slot as usize {
             self.ids.resize(slot as usize + 1, NodeId::default());

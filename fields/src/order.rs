@@ -89,7 +89,11 @@ impl Graph {
     pub(crate) fn order_strong(&mut self, from: NodeId, to: NodeId) {
         let (source, target) = (slot_of(from), slot_of(to));
         let before = self.schedule.ranked(source);
-        if self.schedule.ranked(target) > before {
+        let after = self.schedule.ranked(target);
+        if after > before {
+            // Nodes of a level may have no routes between each other: what follows in it moves on.
+            let level = self.schedule.level_end(before as usize);
+            self.schedule.stale |= level.is_some() && level == self.schedule.level_end(after as usize);
             return;
         }
         let strong = |route: &RouteId| self.routes.all[*route].strength == Strength::Strong;

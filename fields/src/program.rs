@@ -67,6 +67,8 @@ pub(crate) enum Program {
 pub(crate) struct Programs {
     made: Vec<Program>,
     trails: Trails,
+    /// Counts programs that were thrown away.
+    pub(crate) changed: u64,
 }
 
 impl Programs {
@@ -78,6 +80,7 @@ impl Programs {
 
     /// Throws a program away, with the trail that it is part of.
     pub(crate) fn forget(&mut self, slot: u32) {
+        self.changed += 1;
         if let Program::Link { trail, .. } = std::mem::take(&mut self.made[slot as usize]) {
             for link in self.trails.remove(trail).sources() {
                 self.made[link.node as usize] = Program::Unmade;

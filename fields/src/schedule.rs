@@ -22,6 +22,12 @@ pub(crate) const NATIVE: u8 = 64;
 /// Somebody has to hear of the node's changes.
 const INTEREST: u8 = EVALUATES | ROUTED | OBSERVED;
 
+/// True if somebody has to hear of a write of a node with such flags, who does not wait for that already.
+#[inline]
+pub(crate) fn is_news(flags: u8) -> bool {
+    flags & INTEREST != 0 && flags & (DIRTY | IN_TURN) == 0
+}
+
 /// The node has no place in the order.
 pub(crate) const NO_RANK: u32 = u32::MAX;
 
@@ -107,8 +113,7 @@ impl Schedule {
     /// Asks for a turn if anybody would hear of it: in this frame, or in the next if the node had its turn already.
     #[inline]
     pub(crate) fn mark(&mut self, slot: u32) {
-        let flags = self.flags[slot as usize];
-        if flags & INTEREST != 0 && flags & (DIRTY | IN_TURN) == 0 {
+        if is_news(self.flags[slot as usize]) {
             self.enqueue(slot);
         }
     }

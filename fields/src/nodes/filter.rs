@@ -1,4 +1,5 @@
 //! Filters of trackers' input: the one-euro filter, which is steady at rest and quick in motion (Casiez, Roussel, Vogel, CHI 2012, algorithm 1).
+//! The speed is taken from what was measured, not from the filtered value as printed there: that lags, and so would seem to be overtaken.
 
 use std::f64::consts::TAU;
 
@@ -14,6 +15,7 @@ const VALUE_CHANGED: u16 = 3;
 const VELOCITY_CUTOFF: u16 = 4;
 const VELOCITY: u16 = 5;
 const TIME: u16 = 6;
+const MEASURED: u16 = 7;
 
 pub(super) fn types() -> Vec<NodeType> {
     vec![
@@ -44,6 +46,7 @@ where
                 .doc("How fast it is taken to move, per second; of rotations in radians."),
         )
         .field(Field::new("time", Time(0.0)).unit("s").output().doc("When it was measured last."))
+        .field(Field::new("measured", T::empty()).output().doc("What was measured last."))
         .evaluate(evaluate::<T>)
 }
 
@@ -57,7 +60,9 @@ where
     let (now, measured): (f64, T) = (evaluation.time(), evaluation.get(SET_VALUE));
     let passed_s = now - evaluation.get::<Time>(TIME).0;
     let first = !evaluation.written(VALUE_CHANGED);
+    let measured_before: T = evaluation.get(MEASURED);
     evaluation.set(TIME, Time(now));
+    evaluation.set(MEASURED, measured);
     if first {
         return evaluation.set(VALUE_CHANGED, measured);
     }
@@ -69,7 +74,7 @@ where
     let (value, velocity): (T, T::Step) = (evaluation.get(VALUE_CHANGED), evaluation.get(VELOCITY));
     let off = measured.minus(value);
     let share = through(evaluation.get(VELOCITY_CUTOFF));
-    let velocity = velocity * (1.0 - share) + off * ((1.0 / passed_s) as f32 * share);
+    let velocity = velocity * (1.0 - share) + measured.minus(measured_before) * ((1.0 / passed_s) as f32 * share);
     let cutoff_hz = evaluation.get::<f32>(MIN_CUTOFF) + evaluation.get::<f32>(BETA) * T::length(velocity);
     evaluation.set(VELOCITY, velocity);
     evaluation.set(VALUE_CHANGED, value.plus(off * through(cutoff_hz)));

@@ -28,14 +28,14 @@ pub(super) fn restore(
 ) -> Result<Graph, RecordError> {
     check(state)?;
     let slots = state.flags.len();
-    let blank = Node::blank(&graph);
+    let nothing = graph.type_of(NodeId::default()).clone();
     graph.ids.resize(slots, NodeId::default());
     graph.programs.grow(slots);
     graph.schedule.grow(slots);
     graph.changes.restore(state.revision, state.node_revisions.clone());
     let mut nodes = state.nodes.iter().peekable();
     for slot in 1..slots as u32 {
-        let made = graph.nodes.insert(blank.stand_in());
+        let made = graph.nodes.insert(Node::new(nothing.clone(), 0));
         if slot_of(made) != slot {
             return Err(damaged("the graph to restore into is not empty"));
         }
@@ -124,7 +124,7 @@ fn restore_node(graph: &mut Graph, state: &NodeState, types: &mut Types, numbers
     }
     let node = &mut graph.nodes[id];
     (node.node_type, node.dynamic, node.created, node.mode) = (node_type, dynamic, state.created, mode_of(state.mode));
-    node.slots = vec![FREE; state.values.len()];
+    node.slots = smallvec::smallvec![FREE; state.values.len()];
     for (index, value) in state.values.iter().enumerate() {
         let Some(field) = node.field(index as u16) else { continue };
         let (value, written) = match value {

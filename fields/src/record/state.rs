@@ -86,50 +86,17 @@ pub(super) struct CarriedState {
 }
 
 /// Free places of nodes in the order in which they will be used, found by using them.
-fn probe_free(graph: &mut Graph, any: &Node) -> Vec<u32> {
+fn probe_free(graph: &mut Graph) -> Vec<u32> {
+    let nothing = graph.type_of(NodeId::default()).clone();
     let free = graph.ids.len().saturating_sub(1).saturating_sub(graph.nodes.len());
-    let probes: Vec<NodeId> = (0..free).map(|_| graph.nodes.insert(any.stand_in())).collect();
+    let probes: Vec<NodeId> = (0..free).map(|_| graph.nodes.insert(Node::new(nothing.clone(), 0))).collect();
     probes.iter().rev().for_each(|probe| drop(graph.nodes.remove(*probe)));
     probes.into_iter().map(slot_of).collect()
 }
 
-impl Node {
-    /// A node without anything, for a moment.
-    pub(super) fn stand_in(&self) -> Node {
-        Node {
-            node_type: self.node_type.clone(),
-            name: None,
-            slots: Vec::new(),
-            dynamic: Vec::new(),
-            incoming: Vec::new(),
-            outgoing: Vec::new(),
-            created: 0,
-            mode: self.mode,
-            local: self.local,
-        }
-    }
-
-    pub(super) fn blank(graph: &Graph) -> Node {
-        let node_type = graph.type_of(NodeId::default()).clone();
-        let mode = node_type.mode;
-        Node {
-            node_type,
-            name: None,
-            slots: Vec::new(),
-            dynamic: Vec::new(),
-            incoming: Vec::new(),
-            outgoing: Vec::new(),
-            created: 0,
-            mode,
-            local: false,
-        }
-    }
-}
-
 /// All of a graph between two frames.
 pub(super) fn record(graph: &mut Graph, numbers: &mut Numbers, frame: u64, hash: u64) -> StateRecord {
-    let blank = Node::blank(graph);
-    let free = probe_free(graph, &blank);
+    let free = probe_free(graph);
     let mut ids: Vec<NodeId> = graph.nodes.keys().collect();
     ids.sort_by_key(|id| slot_of(*id));
     let nodes = ids.into_iter().map(|id| record_node(graph, id, numbers)).collect();

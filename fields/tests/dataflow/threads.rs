@@ -200,6 +200,80 @@ fn many_nodes_of_a_level_have_their_turns_together_before_the_host() {
 }
 
 #[test]
+fn a_route_within_a_level_is_followed_in_the_next_frame_at_once() {
+    for threads in [1, 2] {
+        let mut graph = Graph::new(crate::support::types());
+        graph.set_threads(threads);
+        let nodes: Vec<NodeId> = (0..100).map(|_| graph.create("Inc").unwrap()).collect();
+        frame(&mut graph);
+        // All are of one level until these come, which agree with the order that there is.
+        for pair in nodes[..4].windows(2) {
+            let (from, to) = (graph.field(pair[0], "out").unwrap(), graph.field(pair[1], "in").unwrap());
+            graph.connect(from, to, Strength::Strong).unwrap();
+        }
+        for (number, node) in nodes.iter().enumerate() {
+            let own = if (1..4).contains(&number) { continue } else { 10 };
+            graph.set_named(*node, "in", own as i64).unwrap();
+        }
+        assert_eq!(frame(&mut graph).evaluated, 100);
+        assert_eq!([0, 1, 2, 3, 4].map(|at| graph.get_named::<i64>(nodes[at], "out").unwrap()), [11, 12, 13, 14, 11]);
+    }
+}
+
+/// Interpolator-like pairs: what is evaluated, and a place that each copies its number to; made in turns, all of one before all of the other, or mixed.
+#[test]
+fn copies_of_a_batch_are_the_same_for_any_number_of_threads_and_wherever_targets_lie() {
+    for order in ["in turns", "apart", "mixed"] {
+        let run = |threads: usize| {
+            let mut graph = Graph::new(mixers());
+            graph.set_threads(threads);
+            let mut random = Random(7);
+            let (mut mixers, mut places) = (Vec::new(), Vec::new());
+            for _ in 0..200 {
+                mixers.push(graph.create("Mix").unwrap());
+                if order == "in turns" {
+                    places.push(graph.create("Plain").unwrap());
+                }
+            }
+            while places.len() < 200 {
+                places.push(graph.create("Plain").unwrap());
+            }
+            if order == "mixed" {
+                (1..200).rev().for_each(|last| places.swap(last, random.below(last + 1)));
+            }
+            // Some take two numbers from two mixers, some tell another mixer, and some of the targets are watched.
+            for (at, mixer) in mixers.iter().enumerate() {
+                let from = FieldId { node: *mixer, index: 2 };
+                graph.connect(from, FieldId { node: places[at / 2], index: (at % 2) as u16 }, Strength::Strong).unwrap();
+                if at % 10 == 0 {
+                    graph.connect(from, FieldId { node: places[199 - at / 10], index: 0 }, Strength::Strong).unwrap();
+                }
+            }
+            for at in 0..20 {
+                let to = graph.create("Mix").unwrap();
+                graph.connect(FieldId { node: places[at], index: 0 }, FieldId { node: to, index: 0 }, Strength::Strong).unwrap();
+            }
+            (0..4i64)
+                .map(|round| {
+                    let seen = graph.revision();
+                    for mixer in mixers.iter().step_by(1 + round as usize) {
+                        graph.set(FieldId { node: *mixer, index: 0 }, round * 77).unwrap();
+                    }
+                    let report = graph.evaluate(round as f64, &mut NoHost);
+                    graph.verify_invariants().unwrap();
+                    (hash(&graph), report, graph.changes_since(seen))
+                })
+                .collect::<Vec<_>>()
+        };
+        let serial = run(1);
+        assert!(serial.iter().all(|(_, report, _)| report.copied > 50));
+        for threads in [2, 5] {
+            assert_eq!(run(threads), serial, "{order}, {threads} threads");
+        }
+    }
+}
+
+#[test]
 fn an_evaluation_is_one_write() {
     let mut graph = Graph::new(mixers());
     for count in [1, 100] {

@@ -1,6 +1,6 @@
 //! Replicas: whatever happens to a graph, its replicas are equal after each frame, and say where they are not.
 
-#[path = "../persistence/dice.rs"]
+#[path = "../shared/dice.rs"]
 mod dice;
 #[path = "../persistence/support.rs"]
 mod support;
