@@ -133,9 +133,9 @@ fn a_loaded_world_goes_on_as_the_saved_one() {
     }
 }
 
-/// Time and size in proportion to the world; printed for the record.
+/// Each node costs its name and what differs from its type.
 #[test]
-fn a_large_world_is_saved_and_loaded_in_time() {
+fn a_large_world_is_saved_in_few_bytes() {
     let mut graph = Graph::new(types());
     let mut last = graph.create("All").unwrap();
     for number in 0..10_000 {
@@ -156,7 +156,7 @@ fn a_large_world_is_saved_and_loaded_in_time() {
         last = node;
     }
     let (text, binary) = (save::to_text(&graph), save::to_binary(&graph));
-    for (bytes, per_node) in [(text.as_bytes(), 200), (&binary, 60)] {
+    for (bytes, per_node) in [(text.as_bytes(), 200), (&binary, 80)] {
         assert!(bytes.len() < per_node * 10_001, "{} bytes a node", bytes.len() / 10_001);
         let (loaded, reports) = save::load(bytes, types()).unwrap();
         assert_eq!((loaded.node_count(), reports.len()), (10_001, 0));
