@@ -403,6 +403,15 @@ pub(crate) struct Cluster {
     /// Break something: kill, freeze, delay, loss or partition, at a frame, of a display, such as freeze@30:wall
     #[arg(long, value_parser = fault)]
     pub(crate) fault: Vec<Fault>,
+    /// Break so many things by dice, one after the other
+    #[arg(long, value_name = "COUNT", conflicts_with = "fault")]
+    pub(crate) random: Option<u64>,
+    /// The first of the seeds that choose what is broken by dice
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Break nothing more by dice after so many minutes
+    #[arg(long, value_parser = positive, requires = "random")]
+    pub(crate) minutes: Option<f64>,
     /// One process for each channel of a display, instead of one for each display
     #[arg(long)]
     pub(crate) channels: bool,
@@ -421,6 +430,14 @@ pub(crate) struct Cluster {
     /// Folder for the pictures; otherwise one that is removed at the end
     #[arg(long)]
     pub(crate) out: Option<PathBuf>,
+}
+
+#[cfg(feature = "cluster")]
+impl Cluster {
+    /// Is anything broken on purpose?
+    pub(crate) fn breaks(&self) -> bool {
+        self.random.is_some() || !self.fault.is_empty()
+    }
 }
 
 #[cfg(feature = "cluster")]

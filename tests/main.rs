@@ -2,6 +2,7 @@
 
 #[cfg(feature = "cluster")]
 mod applications;
+mod cluster;
 mod command;
 mod layers;
 mod recording;

@@ -87,6 +87,12 @@ impl Renderer {
 
     /// Draws all pictures of a frame. What cannot be drawn is left out, with a report in [`Renderer::problems`].
     pub fn render(&mut self, scene: &Scene, pictures: &[Picture]) -> Result<FrameStats, Error> {
+        self.render_part(scene, pictures, pictures)
+    }
+
+    /// Draws some pictures of a frame, the others of which are drawn elsewhere. Maps are fitted to the views of `all` of them, so that
+    /// shadows go on without a seam from one process to the next.
+    pub fn render_part(&mut self, scene: &Scene, pictures: &[Picture], all: &[Picture]) -> Result<FrameStats, Error> {
         let start = Instant::now();
         let mut stats = FrameStats::default();
         self.frame += 1;
@@ -95,7 +101,7 @@ impl Renderer {
         self.take_samples(scene.samples);
         self.take_drawables(scene);
         let lights = Lights::new(scene);
-        let casters = self.choose_maps(scene, pictures);
+        let casters = self.choose_maps(scene, all);
         let (mut jobs, purposes) =
             jobs::jobs(scene, &lights, &self.draws, &self.meshes, &self.deformer, &mut self.films, &mut self.problems);
         let soft = soft::soft_jobs(scene, &lights, &purposes, &mut jobs);

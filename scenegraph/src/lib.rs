@@ -13,5 +13,5 @@ pub mod gltf;
 pub mod nodes;
 pub mod screens;
 
-pub use extract::{ExtractStats, Extractor, Problem, Viewpoint};
+pub use extract::{ExtractStats, Extractor, Problem, Viewpoint, wants_map_once};
 pub use nodes::{WORLD, new_graph, node_types};

@@ -23,8 +23,10 @@ pub(crate) fn display(args: &cli::Display) -> Result<usize, Failure> {
     let mut follower = Follower::connect(options, &args.show, TypeRegistry::from(types))?;
     let started = Instant::now();
     let mut corrupt_after = args.corrupt;
+    // What is corrupted shows in a frame that comes after it.
+    let patience = Duration::from_millis(if args.corrupt.is_some() { 1 } else { 50 });
     while !follower.is_over() {
-        follower.run(&mut canvas, Duration::from_millis(50)).inspect_err(|_| println!("{}", summary(&follower)))?;
+        follower.run(&mut canvas, patience).inspect_err(|_| println!("{}", summary(&follower)))?;
         if args.once && !follower.found_application() && started.elapsed() > Duration::from_secs(PATIENCE_S) {
             return Err(ClusterError::silent(&args.connect, PATIENCE_S, args.link.certificates.is_some()).into());
         }
@@ -49,10 +51,17 @@ fn summary(follower: &Follower) -> String {
     )
 }
 
-/// Changes a value behind the application's back, once a frame has come.
+/// Changes a value behind the application's back, once a frame was drawn: the next one is the first that may be wrong.
 fn corrupt(follower: &mut Follower, frame: u64) -> bool {
-    let Some(replica) = follower.replica_mut().filter(|replica| replica.frame() >= frame) else { return false };
+    let drawn = follower.drawn_frame();
+    let Some(replica) = follower.replica_mut().filter(|replica| replica.frame() >= frame && replica.frame() == drawn) else {
+        return false;
+    };
     let graph = replica.graph_mut();
-    let victim = graph.nodes().find(|node| graph.field(*node, "translation").is_ok());
-    victim.is_some_and(|node| graph.set_named(node, "translation", glam::Vec3::splat(0.25)).is_ok())
+    // What the application writes in each frame is right again with the next one, so the one that was left alone for longest is taken.
+    let fields = ["translation", "direction", "position", "lower_left"];
+    let places = graph.nodes().flat_map(|node| fields.map(|field| (node, field)));
+    let places = places.filter(|(node, field)| graph.get_named::<glam::Vec3>(*node, field).is_ok());
+    let victim = places.min_by_key(|(node, _)| graph.node_revision(*node));
+    victim.is_some_and(|(node, field)| graph.set_named(node, field, glam::Vec3::splat(0.25)).is_ok())
 }

@@ -1,5 +1,7 @@
 //! An application and its displays on one machine: faults, and pictures compared with a render in one process.
 
+use super::faults::Plan;
+use super::maps_once::MapsOnce;
 use super::screen::{channel, file_of};
 use super::{Failure, serve};
 use crate::cli::{self, Fault, FaultKind};
@@ -16,25 +18,14 @@ use umbriel_displays::cluster::{Host, HostOptions, LEASE, Proxy, Security};
 use umbriel_render::{Gpu, Renderer};
 use umbriel_scene::Picture;
 
-/// How long a fault lasts, but for kill.
-const LASTS: Duration = Duration::from_secs(1);
-/// How long displays may take to come back.
+/// How long a process may be silent where nothing is broken.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A display process.
-struct Process {
-    show: String,
-    child: Child,
-    proxy: Option<Proxy>,
-}
-
-/// A fault that began.
-struct Open {
-    fault: Fault,
-    heals: Instant,
-    is_healed: bool,
-    /// Was the display out of the lock at all?
-    was_out: bool,
+pub(super) struct Process {
+    pub(super) show: String,
+    pub(super) child: Child,
+    pub(super) proxy: Option<Proxy>,
 }
 
 /// Runs everything; gives the number of pictures and values that differ.
@@ -45,7 +36,7 @@ pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
         return Err(format!("there is no display `{}` to break; there are: {}", fault.display, shows.join(", ")).into());
     }
     let address = free_address()?;
-    let default_ms = if args.fault.is_empty() { 60_000 } else { 200 };
+    let default_ms = if args.breaks() { 200 } else { 60_000 };
     let options = HostOptions {
         listen: format!("tcp/{address}"),
         security: Security::Loopback,
@@ -54,13 +45,13 @@ pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
     };
     let mut host = Host::listen(&options)?;
     let folder = args.out.clone().unwrap_or_else(|| std::env::temp_dir().join(format!("umbriel-cluster-{}", std::process::id())));
-    let mut launcher = Launcher { args, address, folder: folder.clone() };
+    let launcher = Launcher { args, address, folder: folder.clone() };
     let mut processes: Vec<Process> =
         shows.iter().enumerate().map(|(place, show)| launcher.start(show, place == 0)).collect::<Result<_, Failure>>()?;
     let count = processes.len();
-    serve::begin(&mut session, &mut host, count, &mut || all_run(&mut processes))?;
-    let (mut faults, mut pending, mut was_whole): (Vec<Open>, _, _) = (Vec::new(), args.fault.clone(), false);
-    let mut rejoins = Vec::new();
+    let mut once = MapsOnce::default();
+    serve::begin(&mut session, &mut once, &mut host, count, &mut || all_run(&mut processes))?;
+    let mut plan = Plan::new(args, &shows);
     let started = Instant::now();
     let mut frame = 1;
     let mut is_last = false;
@@ -68,38 +59,16 @@ pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
         host.wait_until(session.graph(), started + Duration::from_secs_f64(frame as f64 / args.fps));
         frame += 1;
         // Frames after the last one that was asked for give everybody the time to come back.
-        let overdue = started.elapsed() > Duration::from_secs_f64(args.frames as f64 / args.fps) + PATIENCE;
-        is_last = frame >= args.frames && (faults.is_empty() && pending.is_empty() || overdue);
+        is_last = frame >= args.frames && plan.is_over();
         // Nothing is broken before everybody is in the lock for the first time.
-        was_whole |= host.live().len() == count;
-        for fault in pending.extract_if(.., |fault| was_whole && fault.frame <= frame) {
-            faults.push(begin(&fault, &mut processes, &mut launcher)?);
+        if host.live().len() == count {
+            plan.begin(frame, &host, &mut processes, &launcher)?;
         }
-        serve::step(&mut session, &mut host, (frame - 1) as f64 / args.fps, is_last);
-        let live = host.live();
-        for open in &mut faults {
-            heal(open, &processes)?;
-            let is_live = live.contains(&open.fault.display);
-            open.was_out |= !is_live;
-            let is_back = open.is_healed && is_live && (open.was_out || open.heals.elapsed() > LASTS);
-            if is_back {
-                rejoins.push((open.fault.clone(), open.was_out.then(|| open.heals.elapsed())));
-            }
-        }
-        faults.retain(|open| !rejoins.iter().any(|(fault, _)| *fault == open.fault));
+        serve::step(&mut session, &mut once, &mut host, (frame - 1) as f64 / args.fps, is_last);
+        plan.watch(&host, &processes)?;
     }
     println!("{}", serve::summary(&host));
-    for (fault, rejoin) in &rejoins {
-        let back = rejoin.map_or("never out of the lock".into(), |time| format!("back after {:.0} ms", time.as_secs_f64() * 1e3));
-        println!("{:?}@{}:{}: {back}", fault.kind, fault.frame, fault.display);
-    }
-    for open in &faults {
-        tracing::error!("display `{}` did not come back from {:?}", open.fault.display, open.fault.kind);
-    }
-    for fault in &pending {
-        tracing::error!("{:?}@{}:{}: the displays were never all in the lock", fault.kind, fault.frame, fault.display);
-    }
-    let disagreed = host.report().disagreed as usize + faults.len() + pending.len();
+    let disagreed = host.report().disagreed as usize + plan.failures();
     drop(host);
     for process in processes {
         let output = process.child.wait_with_output()?;
@@ -114,7 +83,7 @@ pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
 
 /// Where nothing is broken on purpose, a machine that all processes share may be slow.
 fn lease(args: &cli::Cluster) -> Duration {
-    if args.fault.is_empty() { PATIENCE } else { LEASE }
+    if args.breaks() { LEASE } else { PATIENCE }
 }
 
 /// An error if a process has ended.
@@ -128,21 +97,22 @@ fn all_run(processes: &mut [Process]) -> Result<(), Failure> {
 }
 
 /// Starts display processes.
-struct Launcher<'a> {
+pub(super) struct Launcher<'a> {
     args: &'a cli::Cluster,
-    address: SocketAddr,
+    pub(super) address: SocketAddr,
     folder: PathBuf,
 }
 
 impl Launcher<'_> {
-    fn start(&mut self, show: &str, is_first: bool) -> Result<Process, Failure> {
-        let is_broken = |fault: &&Fault| fault.display == show && !matches!(fault.kind, FaultKind::Kill | FaultKind::Freeze);
-        let proxy = self.args.fault.iter().find(is_broken).map(|_| Proxy::start(self.address)).transpose()?;
+    fn start(&self, show: &str, is_first: bool) -> Result<Process, Failure> {
+        let is_broken = |fault: &Fault| fault.display == show && !matches!(fault.kind, FaultKind::Kill | FaultKind::Freeze);
+        let needs_proxy = self.args.random.is_some() || self.args.fault.iter().any(is_broken);
+        let proxy = needs_proxy.then(|| Proxy::start(self.address)).transpose()?;
         let port = proxy.as_ref().map_or(self.address.port(), Proxy::port);
         Ok(Process { show: show.into(), child: self.spawn(show, port, is_first)?, proxy })
     }
 
-    fn spawn(&self, show: &str, port: u16, is_first: bool) -> Result<Child, Failure> {
+    pub(super) fn spawn(&self, show: &str, port: u16, is_first: bool) -> Result<Child, Failure> {
         let assets = self.args.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let mut command = Command::new(std::env::current_exe()?);
         command.args(["display", "--headless", "--once", "--show", show]);
@@ -156,48 +126,6 @@ impl Launcher<'_> {
         }
         Ok(command.stdout(Stdio::piped()).spawn()?)
     }
-}
-
-fn begin(fault: &Fault, processes: &mut [Process], launcher: &mut Launcher<'_>) -> Result<Open, Failure> {
-    let process = processes.iter_mut().find(|process| process.show == fault.display).ok_or("no such display")?;
-    let mut heals = Instant::now() + LASTS;
-    match (fault.kind, &process.proxy) {
-        (FaultKind::Kill, _) => {
-            process.child.kill()?;
-            process.child.wait()?;
-            let port = process.proxy.as_ref().map_or(launcher.address.port(), Proxy::port);
-            process.child = launcher.spawn(&process.show, port, false)?;
-            heals = Instant::now();
-        }
-        (FaultKind::Freeze, _) => signal(&process.child, "-STOP")?,
-        (FaultKind::Delay, Some(proxy)) => proxy.delay(Duration::from_millis(30)),
-        (FaultKind::Loss, Some(proxy)) => proxy.lose(10),
-        (FaultKind::Partition, Some(proxy)) => proxy.cut(LASTS),
-        (_, None) => return Err("this display has no proxy".into()),
-    }
-    tracing::info!("{:?} of `{}` at frame {}", fault.kind, fault.display, fault.frame);
-    Ok(Open { fault: fault.clone(), heals, is_healed: false, was_out: fault.kind == FaultKind::Kill })
-}
-
-fn heal(open: &mut Open, processes: &[Process]) -> Result<(), Failure> {
-    if open.is_healed || Instant::now() < open.heals {
-        return Ok(());
-    }
-    let process = processes.iter().find(|process| process.show == open.fault.display).ok_or("no such display")?;
-    if open.fault.kind == FaultKind::Freeze {
-        signal(&process.child, "-CONT")?;
-    }
-    if let Some(proxy) = &process.proxy {
-        proxy.delay(Duration::ZERO);
-        proxy.lose(0);
-    }
-    open.is_healed = true;
-    Ok(())
-}
-
-fn signal(child: &Child, signal: &str) -> Result<(), Failure> {
-    let status = Command::new("kill").args([signal, &child.id().to_string()]).status()?;
-    if status.success() { Ok(()) } else { Err(format!("kill {signal}: {status}").into()) }
 }
 
 /// An address of this machine on which nobody listens.
@@ -226,7 +154,7 @@ fn file_name(show: &str) -> String {
 
 /// Compares what displays showed with a render of all in this process; gives the number of pictures that differ or are missing.
 fn compare(args: &cli::Cluster, shows: &[String], folder: &Path, frames: u64) -> Result<usize, Failure> {
-    let mut session = Session::open(&args.path)?;
+    let mut session = Session::open(&args.path)?.wait_for_casters();
     let gpu = Gpu::new(None)?;
     let mut renderer = Renderer::new(&gpu)?;
     let mut tally: BTreeMap<&str, (usize, usize, u8)> = BTreeMap::new();
@@ -262,7 +190,7 @@ fn compare(args: &cli::Cluster, shows: &[String], folder: &Path, frames: u64) ->
         let (compared, different, largest) = tally.get(show.as_str()).copied().unwrap_or_default();
         println!("{show}: {compared} pictures compared, {different} differ, largest difference {largest}/255");
         wrong += different + (compared == 0) as usize;
-        if args.fault.is_empty() && compared as u64 + 1 != frames {
+        if !args.breaks() && compared as u64 + 1 != frames {
             tracing::error!("{show}: {} of {} pictures are missing", frames - 1 - compared as u64, frames - 1);
             wrong += 1;
         }

@@ -1,9 +1,11 @@
 //! Worlds on many displays: the application, a display, and both on one machine to test them.
 
 mod display;
+mod faults;
 mod harness;
 mod interrupt;
 mod join;
+mod maps_once;
 mod screen;
 mod serve;
 

@@ -7,10 +7,10 @@ use crate::session::bounds;
 use std::path::{Path, PathBuf};
 use umbriel_displays::WindowSizes;
 use umbriel_displays::cluster::{ClusterError, Screen};
-use umbriel_displays::rig::{Rig, Wanted};
+use umbriel_displays::rig::{DESKTOP, Rig, Wanted};
 use umbriel_fields::Graph;
 use umbriel_render::{Gpu, Renderer, RgbaPixels};
-use umbriel_scene::{Picture, Scene};
+use umbriel_scene::{Aabb, Picture, Scene};
 use umbriel_scenegraph::Extractor;
 
 /// Why a display ends.
@@ -64,6 +64,8 @@ pub(super) struct Canvas {
     extractor: Extractor,
     scene: Scene,
     rig: Rig,
+    /// Of all displays.
+    whole: Rig,
     drawn: Vec<RgbaPixels>,
 }
 
@@ -79,8 +81,23 @@ impl Canvas {
             extractor: Extractor::new(),
             scene: Scene::default(),
             rig: Rig::new(),
+            whole: Rig::new(),
             drawn: Vec::new(),
         })
+    }
+}
+
+impl Canvas {
+    /// What all displays show, here and elsewhere.
+    fn installation(&mut self, graph: &Graph, bounds: &Aabb, shown: &[Picture]) -> Result<Vec<Picture>, ScreenError> {
+        let wanted = Wanted { view: None, size: DESKTOP_SIZE, windows: &WindowSizes::new() };
+        let mut all = self.whole.pictures(graph, self.extractor.viewpoints(), bounds, &wanted)?.pictures;
+        // A viewpoint is shown by this process alone.
+        all.retain(|picture| picture.name != DESKTOP);
+        let is_elsewhere = |one: &&Picture| !all.iter().any(|other| other.name == one.name);
+        let alone: Vec<Picture> = shown.iter().filter(is_elsewhere).cloned().collect();
+        all.extend(alone);
+        Ok(all)
     }
 }
 
@@ -89,15 +106,17 @@ impl Screen for Canvas {
 
     fn draw(&mut self, graph: &Graph, _frame: u64, is_new: bool) -> Result<(), ScreenError> {
         if is_new {
-            self.extractor = Extractor::new().with_asset_root(&self.assets);
+            self.extractor = Extractor::new().with_asset_root(&self.assets).with_ready_casters();
             self.scene = Scene::default();
             self.rig.refit();
+            self.whole.refit();
         }
         self.extractor.update(graph, &mut self.scene);
         for problem in self.extractor.problems() {
             tracing::error!("{problem}");
         }
-        let (name, wanted_channel) = channel_of(&self.show);
+        let show = self.show.clone();
+        let (name, wanted_channel) = channel_of(&show);
         let bounds = bounds(&self.scene).transformed(&self.extractor.world_from_room());
         let wanted = Wanted { view: Some(name), size: DESKTOP_SIZE, windows: &WindowSizes::new() };
         let found = self.rig.pictures(graph, self.extractor.viewpoints(), &bounds, &wanted)?;
@@ -105,12 +124,13 @@ impl Screen for Canvas {
             tracing::error!("{problem}");
         }
         let mut pictures = found.pictures;
+        let all = self.installation(graph, &bounds, &pictures)?;
         if let Some(wanted) = wanted_channel {
             let count = pictures.iter().map(|picture| picture.views.len()).sum();
             let one = pictures.iter().find_map(|picture| channel(picture, wanted));
             pictures = vec![one.ok_or_else(|| ScreenError::Channel { display: name.into(), channel: wanted, count })?];
         }
-        self.renderer.render(&self.scene, &pictures)?;
+        self.renderer.render_part(&self.scene, &pictures, &all)?;
         for problem in self.renderer.problems() {
             tracing::error!("{problem}");
         }

@@ -1,6 +1,7 @@
 //! The application: evaluates a world and publishes its frames.
 
 use super::interrupt::Interrupt;
+use super::maps_once::MapsOnce;
 use super::{Failure, security};
 use crate::cli;
 use crate::session::Session;
@@ -21,14 +22,15 @@ pub(crate) fn serve(args: &cli::Serve) -> Result<usize, Failure> {
     let mut desk = Desk::open(&host, &session.name())?;
     let interrupt = Interrupt::watch()?;
     println!("{} is served at {}", session.name(), args.listen);
-    let mut problems = begin(&mut session, &mut host, args.wait_for, &mut || Ok(()))?;
+    let mut once = MapsOnce::default();
+    let mut problems = begin(&mut session, &mut once, &mut host, args.wait_for, &mut || Ok(()))?;
     let (started, mut frame) = (Instant::now(), 1u64);
     while args.frames.is_none_or(|frames| frame < frames) && !interrupt.came() {
         let next = started + Duration::from_secs_f64(frame as f64 / args.fps);
         host.wait_until(session.graph(), next);
         frame += 1;
         let is_last = args.frames == Some(frame) || interrupt.came();
-        problems += step_with(&mut session, &mut host, Some(&mut desk), started.elapsed().as_secs_f64(), is_last);
+        problems += step_with(&mut session, &mut once, &mut host, Some(&mut desk), started.elapsed().as_secs_f64(), is_last);
     }
     println!("{}", summary(&host));
     Ok(problems)
@@ -37,11 +39,12 @@ pub(crate) fn serve(args: &cli::Serve) -> Result<usize, Failure> {
 /// Publishes the first frame and waits for displays, as long as `goes_on` says nothing else.
 pub(super) fn begin(
     session: &mut Session,
+    once: &mut MapsOnce,
     host: &mut Host,
     displays: usize,
     goes_on: &mut dyn FnMut() -> Result<(), Failure>,
 ) -> Result<usize, Failure> {
-    let problems = step(session, host, 0.0, false);
+    let problems = step(session, once, host, 0.0, false);
     while host.in_time() < displays {
         host.wait_until(session.graph(), Instant::now() + Duration::from_millis(20));
         goes_on()?;
@@ -50,13 +53,21 @@ pub(super) fn begin(
 }
 
 /// One frame; gives the number of problems.
-pub(super) fn step(session: &mut Session, host: &mut Host, time_s: f64, is_last: bool) -> usize {
-    step_with(session, host, None, time_s, is_last)
+pub(super) fn step(session: &mut Session, once: &mut MapsOnce, host: &mut Host, time_s: f64, is_last: bool) -> usize {
+    step_with(session, once, host, None, time_s, is_last)
 }
 
 /// One frame of a world that others work on as well.
-fn step_with(session: &mut Session, host: &mut Host, mut desk: Option<&mut Desk>, time_s: f64, is_last: bool) -> usize {
+fn step_with(
+    session: &mut Session,
+    once: &mut MapsOnce,
+    host: &mut Host,
+    mut desk: Option<&mut Desk>,
+    time_s: f64,
+    is_last: bool,
+) -> usize {
     let mut told = 0;
+    once.end(session.graph_mut());
     for input in host.inputs() {
         if let Err(reason) = apply(session.graph_mut(), &input) {
             tracing::error!("display `{}`: {reason}", input.display);
@@ -67,6 +78,7 @@ fn step_with(session: &mut Session, host: &mut Host, mut desk: Option<&mut Desk>
         desk.begin(session.graph_mut());
     }
     session.evaluate(time_s);
+    once.find(session.graph());
     if let Some(desk) = &mut desk {
         desk.publish(host, session.graph());
     }

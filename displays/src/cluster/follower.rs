@@ -101,6 +101,7 @@ pub struct Follower {
     took: Duration,
     /// Of the replica as it was drawn last; by now it may be further.
     drawn_hash: u64,
+    drawn_frame: u64,
     report: FollowerReport,
     _held: (Vec<Subscriber<()>>, LivelinessToken),
 }
@@ -166,6 +167,7 @@ impl Follower {
             is_over: false,
             took: Duration::ZERO,
             drawn_hash: 0,
+            drawn_frame: 0,
             report: FollowerReport::default(),
             _held: (subscribers, token),
         })
@@ -189,6 +191,11 @@ impl Follower {
     /// The replica, for tests that corrupt it.
     pub fn replica_mut(&mut self) -> Option<&mut Replica> {
         self.replica.as_mut()
+    }
+
+    /// The frame that was drawn last, shown or not.
+    pub fn drawn_frame(&self) -> u64 {
+        self.drawn_frame
     }
 
     /// Tells the application of something that happened here.
@@ -279,6 +286,7 @@ impl Follower {
                 self.parked.clear();
             }
             Arrived::Application(true) => self.alone_since = None,
+            Arrived::Application(false) if self.is_over => {}
             Arrived::Application(false) => {
                 tracing::warn!("display `{}`: the application is gone; waiting for it to come back", self.name);
                 self.alone_since = Some(Instant::now());
@@ -346,8 +354,9 @@ impl Follower {
                     DisplayAction::Apply(frame) => events.push_back(self.apply(frame)?),
                     DisplayAction::Draw(frame) => {
                         let began = Instant::now();
-                        if let Some(replica) = &self.replica {
-                            self.drawn_hash = replica.hash();
+                        if let Some(replica) = &mut self.replica {
+                            self.drawn_hash = replica.hash_now();
+                            self.drawn_frame = frame;
                             screen.draw(replica.graph(), frame, std::mem::take(&mut self.is_new))?;
                         }
                         self.took = began.elapsed();

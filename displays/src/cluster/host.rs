@@ -200,6 +200,11 @@ impl Host {
         self.lock.live().filter_map(|id| self.names.get(&id.0).cloned()).collect()
     }
 
+    /// Is there a display of this name, in the lock or not?
+    pub fn knows(&self, name: &str) -> bool {
+        self.names.values().any(|known| known == name)
+    }
+
     /// How many displays have drawn the last frame, waited for or not.
     pub fn in_time(&self) -> usize {
         self.lock.in_time()

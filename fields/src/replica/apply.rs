@@ -102,6 +102,12 @@ impl Replica {
         self.shares.sum()
     }
 
+    /// The same, with what was written to the graph since the last frame.
+    pub fn hash_now(&mut self) -> u64 {
+        self.update_hash();
+        self.hash()
+    }
+
     /// True if all values are those of the application.
     pub fn agrees(&self) -> bool {
         self.hash() == self.expected

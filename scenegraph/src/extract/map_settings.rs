@@ -5,7 +5,7 @@ use super::problem::Problems;
 use super::read::{Reader, label, type_name};
 use crate::nodes::projection::{BIAS, SCALE, SIZE};
 use glam::{Vec2, Vec4};
-use umbriel_fields::Graph;
+use umbriel_fields::{EnumValue, Graph, NodeId};
 use umbriel_scene::{LightKind, MapFilter, MapSettings, MapUpdate};
 
 /// The constant offset that `bias` of a GeneratedShadowMap counts, metres (003 section 4.4 leaves it to us).
@@ -15,6 +15,14 @@ const BIAS_M: f32 = 1e-4;
 const FILTERS: [MapFilter; 6] =
     [MapFilter::None, MapFilter::Hardware, MapFilter::Pcf4, MapFilter::Pcf16, MapFilter::Poisson, MapFilter::Pcss];
 const UPDATES: [MapUpdate; 4] = [MapUpdate::Auto, MapUpdate::Never, MapUpdate::Always, MapUpdate::Next];
+
+/// Does a light ask for its map in this frame only? Before the next one its `shadow_update` falls back to none (003 section 4.1), which is
+/// up to whoever may write to the graph: [`Extractor::maps_drawn_once`](super::Extractor::maps_drawn_once) for those who extract, this for
+/// those who do not.
+pub fn wants_map_once(graph: &Graph, node: NodeId) -> bool {
+    let update = graph.get_named::<EnumValue>(node, "shadow_update").ok();
+    update.and_then(|update| UPDATES.get(update.0 as usize)) == Some(&MapUpdate::Next)
+}
 
 /// Zero means fitted; anything that makes no frustum is reported and fitted.
 pub(super) fn map_settings(read: &Reader<'_>, kind: &LightKind, check: &mut Check<'_>) -> MapSettings {

@@ -32,6 +32,7 @@ mod texture;
 #[cfg(test)]
 mod tests;
 
+pub use map_settings::wants_map_once;
 pub use problem::Problem;
 pub use room::Viewpoint;
 

@@ -1,0 +1,182 @@
+//! An application and four display processes on loopback: `cargo bench -p umbriel-displays --features cluster --bench distribution`.
+//!
+//! Each frame writes translation, rotation and scale of 10 000 transforms, or of one. Displays apply and verify them, and draw nothing. The
+//! measure beside it is TCP that sends the same bytes to four processes, each of which answers with one byte.
+
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command};
+use std::time::{Duration, Instant};
+
+use glam::{Quat, Vec3};
+use umbriel_displays::cluster::{ClusterError, Follower, FollowerOptions, Host, HostOptions, LEASE, Screen, Security};
+use umbriel_fields::{FieldId, Graph, NodeType, TypeRegistry, builtin_types};
+use umbriel_scenegraph::{new_graph, node_types};
+
+const DISPLAYS: usize = 4;
+const TRANSFORMS: usize = 10_000;
+const FIELDS: usize = 3;
+/// Frames that are measured in each row.
+const FRAMES: usize = 300;
+const TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Draws nothing.
+struct Blind;
+
+impl Screen for Blind {
+    type Error = ClusterError;
+    fn draw(&mut self, _: &Graph, _: u64, _: bool) -> Result<(), ClusterError> {
+        Ok(())
+    }
+    fn show(&mut self, _: u64) -> Result<(), ClusterError> {
+        Ok(())
+    }
+}
+
+type Failure = Box<dyn std::error::Error>;
+
+fn main() -> Result<(), Failure> {
+    let args: Vec<String> = std::env::args().collect();
+    let place = |name: &str| args.iter().position(|arg| arg == name).and_then(|at| args.get(at + 1)).cloned();
+    if let Some(address) = place("--raw") {
+        return raw_display(&address);
+    }
+    match (place("--display"), place("--name")) {
+        (Some(endpoint), Some(name)) => display(endpoint, &name),
+        _ => application(),
+    }
+}
+
+fn again(args: &[&str]) -> Result<Child, Failure> {
+    Ok(Command::new(std::env::current_exe()?).args(args).spawn()?)
+}
+
+fn free_address() -> Result<String, Failure> {
+    Ok(TcpListener::bind("127.0.0.1:0")?.local_addr()?.to_string())
+}
+
+fn display(endpoint: String, name: &str) -> Result<(), Failure> {
+    let types: Vec<NodeType> = node_types().into_iter().chain(builtin_types()).collect();
+    let options = FollowerOptions { endpoint, security: Security::Loopback, lease: LEASE, ends_with_application: true };
+    let mut follower = Follower::connect(options, name, TypeRegistry::from(types))?;
+    while !follower.is_over() {
+        follower.run(&mut Blind, Duration::from_millis(50))?;
+    }
+    Ok(())
+}
+
+fn raw_display(address: &str) -> Result<(), Failure> {
+    let mut stream = TcpStream::connect(address)?;
+    stream.set_nodelay(true)?;
+    let mut buffer = Vec::new();
+    let mut length = [0; 8];
+    while stream.read_exact(&mut length).is_ok() {
+        buffer.resize(u64::from_le_bytes(length) as usize, 0);
+        stream.read_exact(&mut buffer)?;
+        stream.write_all(&[1])?;
+    }
+    Ok(())
+}
+
+/// Writes so many transforms.
+fn write(graph: &mut Graph, fields: &[[FieldId; FIELDS]], frame: usize) -> Result<(), Failure> {
+    for (number, [translation, rotation, scale]) in fields.iter().enumerate() {
+        let x = (frame * 31 + number) as f32 * 0.001;
+        graph.set(*translation, Vec3::new(x, 1.0, -x))?;
+        graph.set(*rotation, Quat::from_rotation_y(x))?;
+        graph.set(*scale, Vec3::splat(1.0 + x))?;
+    }
+    Ok(())
+}
+
+fn application() -> Result<(), Failure> {
+    let mut graph = new_graph();
+    let mut fields = Vec::new();
+    for _ in 0..TRANSFORMS {
+        let node = graph.create("Transform")?;
+        fields.push([graph.field(node, "translation")?, graph.field(node, "rotation")?, graph.field(node, "scale")?]);
+    }
+    let endpoint = format!("tcp/{}", free_address()?);
+    let mut host =
+        Host::listen(&HostOptions { listen: endpoint.clone(), security: Security::Loopback, timeout: TIMEOUT, lease: LEASE })?;
+    let mut displays = Vec::new();
+    for number in 0..DISPLAYS {
+        displays.push(again(&["--display", &endpoint, "--name", &number.to_string()])?);
+    }
+    host.frame(&graph, false);
+    while host.in_time() < DISPLAYS {
+        host.wait_until(&graph, Instant::now() + Duration::from_millis(10));
+    }
+    let mut bytes_of_frame = 0;
+    for (label, count, period) in [
+        ("10 000 transforms, as fast as can be", TRANSFORMS, Duration::ZERO),
+        ("10 000 transforms at 60 Hz", TRANSFORMS, Duration::from_micros(16_667)),
+        ("one transform at 60 Hz", 1, Duration::from_micros(16_667)),
+    ] {
+        let (bytes, from) = (host.report().bytes, host.report().waits_us.len());
+        let started = Instant::now();
+        for frame in 0..FRAMES {
+            write(&mut graph, &fields[..count], frame)?;
+            host.frame(&graph, false);
+            if !period.is_zero() {
+                host.wait_until(&graph, started + period * (frame as u32 + 1));
+            }
+        }
+        let bytes = (host.report().bytes - bytes) as f64 / FRAMES as f64;
+        bytes_of_frame = bytes_of_frame.max(bytes as usize);
+        tell(label, started.elapsed(), bytes, count, host.report().waits_us[from..].to_vec());
+    }
+    host.frame(&graph, true);
+    println!("left behind: {}, disagreed: {}", host.report().dropped.len(), host.report().disagreed);
+    drop(host);
+    for mut child in displays {
+        child.wait()?;
+    }
+    raw(bytes_of_frame)
+}
+
+fn raw(bytes: usize) -> Result<(), Failure> {
+    let listener = TcpListener::bind("127.0.0.1:0")?;
+    let address = listener.local_addr()?.to_string();
+    let mut children = Vec::new();
+    let mut streams = Vec::new();
+    for _ in 0..DISPLAYS {
+        children.push(again(&["--raw", &address])?);
+        let (stream, _) = listener.accept()?;
+        stream.set_nodelay(true)?;
+        streams.push(stream);
+    }
+    let packet = [&(bytes as u64).to_le_bytes()[..], &vec![7; bytes]].concat();
+    let mut waits_us = Vec::new();
+    let started = Instant::now();
+    for _ in 0..FRAMES {
+        let sent = Instant::now();
+        for stream in &mut streams {
+            stream.write_all(&packet)?;
+        }
+        for stream in &mut streams {
+            stream.read_exact(&mut [0])?;
+        }
+        waits_us.push(sent.elapsed().as_micros() as u32);
+    }
+    tell("raw TCP, the same bytes", started.elapsed(), bytes as f64, TRANSFORMS, waits_us);
+    drop(streams);
+    for mut child in children {
+        child.wait()?;
+    }
+    Ok(())
+}
+
+fn tell(label: &str, took: Duration, bytes: f64, transforms: usize, mut waits_us: Vec<u32>) {
+    waits_us.sort_unstable();
+    let at = |of_1000: usize| f64::from(waits_us[waits_us.len() * of_1000 / 1000]) * 1e-3;
+    let rate = FRAMES as f64 / took.as_secs_f64();
+    println!(
+        "{label}: {rate:.0} frames/s, {:.0} bytes a frame, {:.0} MB/s to all, {:.2} million updates/s at each, barrier p50 {:.2} ms, p99 {:.2} ms",
+        bytes,
+        rate * bytes * DISPLAYS as f64 * 1e-6,
+        rate * (transforms * FIELDS) as f64 * 1e-6,
+        at(500),
+        at(990)
+    );
+}
