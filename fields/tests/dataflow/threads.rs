@@ -249,9 +249,9 @@ fn copies_of_a_batch_are_the_same_for_any_number_of_threads_and_wherever_targets
                     graph.connect(from, FieldId { node: places[199 - at / 10], index: 0 }, Strength::Strong).unwrap();
                 }
             }
-            for at in 0..20 {
+            for watched in &places[..20] {
                 let to = graph.create("Mix").unwrap();
-                graph.connect(FieldId { node: places[at], index: 0 }, FieldId { node: to, index: 0 }, Strength::Strong).unwrap();
+                graph.connect(FieldId { node: *watched, index: 0 }, FieldId { node: to, index: 0 }, Strength::Strong).unwrap();
             }
             (0..4i64)
                 .map(|round| {
