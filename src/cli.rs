@@ -375,9 +375,6 @@ pub(crate) struct Display {
     pub(crate) show: String,
     #[command(flatten)]
     pub(crate) link: Link,
-    /// Folder that the world's pictures lie in
-    #[arg(long, default_value = ".")]
-    pub(crate) assets: PathBuf,
     /// Draw without a window, which is how displays draw
     #[arg(long, required = true)]
     pub(crate) headless: bool,

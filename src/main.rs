@@ -22,6 +22,9 @@ use clap::Parser;
 use cli::{Cli, Command};
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
+#[cfg(feature = "cluster")]
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::{EnvFilter, Layer, layer::SubscriberExt, util::SubscriberInitExt};
 
 /// The exit status of a command that did its work, but reported problems on the way.
 const WITH_PROBLEMS: u8 = 2;
@@ -34,16 +37,7 @@ fn main() -> ExitCode {
             return if error.use_stderr() { ExitCode::FAILURE } else { ExitCode::SUCCESS };
         }
     };
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env();
-    tracing_subscriber::fmt()
-        .with_env_filter(filter.unwrap_or_else(|_| {
-            "warn,umbriel::script=info,umbriel::cluster=info,umbriel_scripts=info,umbriel_displays=info,zenoh=error,wgpu_hal=error,wgpu_core=error,naga=error".into()
-        }))
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .without_time()
-        .with_target(false)
-        .init();
+    log();
     let result = match &cli.command {
         Command::Run(args) if args.headless => headless::run(args),
         Command::Run(args) => window::run(args).map(|()| 0),
@@ -79,6 +73,28 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Logs to the terminal what RUST_LOG asks for.
+fn log() {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
+        "warn,umbriel::script=info,umbriel::cluster=info,umbriel_scripts=info,umbriel_displays=info,\
+         zenoh=error,zenoh_link_tls=error,wgpu_hal=error,wgpu_core=error,naga=error"
+            .into()
+    });
+    let text = tracing_subscriber::fmt::layer()
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .without_time()
+        .with_target(false)
+        .with_filter(filter);
+    let all = tracing_subscriber::registry().with(text);
+    #[cfg(feature = "cluster")]
+    let all = {
+        let theirs = Targets::new().with_target(cluster::Refusals::TARGET, tracing::Level::WARN);
+        all.with(cluster::Refusals.with_filter(theirs))
+    };
+    all.init();
 }
 
 /// Prints a long text; a reader that has seen enough is no problem.

@@ -48,6 +48,9 @@ pub(crate) struct Session {
     navigation: Option<NavigationNode>,
     /// What was reported and not yet told.
     problems: Vec<String>,
+    /// For replicas, which have no files.
+    #[cfg(feature = "cluster")]
+    embedder: umbriel_scenegraph::Embedder,
 }
 
 impl Session {
@@ -86,6 +89,8 @@ impl Session {
             rig: Rig::new(),
             navigation: None,
             problems: Vec::new(),
+            #[cfg(feature = "cluster")]
+            embedder: umbriel_scenegraph::Embedder::new(folder_of(path)),
         }
     }
 
@@ -141,6 +146,12 @@ impl Session {
             Source::World(world) => world.save(form).map(Some),
             Source::Replay(_) => Ok(None),
         }
+    }
+
+    /// Puts files that nodes name into the nodes, for processes that have no files.
+    #[cfg(feature = "cluster")]
+    pub(crate) fn embed(&mut self) {
+        self.embedder.update(self.source.graph_mut(), &|_| true);
     }
 
     /// Has a recording been played to its end?
@@ -323,9 +334,13 @@ pub(crate) fn bounds(scene: &Scene) -> Aabb {
     scene.drawables.iter().filter(|d| d.visible).fold(Aabb::EMPTY, |b, d| b.union(d.bounds_in_world))
 }
 
+/// The folder that a file lies in; the parent of a bare name is empty, which no system call takes for the current folder.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 fn extractor_beside(path: &Path, waits: bool) -> Extractor {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let extractor = Extractor::new().with_asset_root(folder);
+    let extractor = Extractor::new().with_asset_root(folder_of(path));
     if waits { extractor.with_ready_casters() } else { extractor }
 }
 

@@ -140,3 +140,62 @@ fn applications_share_a_world_and_locks_of_the_dead_expire() {
     let after = until(PATIENCE, || host.said()[before..].contains(r#"world ["ball", "first_box"] ball 2"#).then_some(()));
     assert!(after.is_some(), "{}", host.said());
 }
+
+/// A world with one display.
+const ROOM: &str = r#"
+world.add(shape(make("Sphere")));
+let visitor = make("User", #{ position: vec3(0, 1.7, 2) });
+let front = make("Screen", #{ lower_left: vec3(-2, 0, 0), lower_right: vec3(2, 0, 0), upper_left: vec3(-2, 2.5, 0) });
+make("Display", #{ name: "wall", user: visitor, screens: [front], size: vec2(64, 40) });"#;
+
+#[test]
+fn bad_input_is_named() {
+    let (folder, address) = prepare("bad", &[("room.rhai", ROOM), ("authority.pem", "garbage")]);
+    let folder = folder.to_string_lossy().into_owned();
+    let room = format!("{folder}/room.rhai");
+    let host = Process::start(&["serve", &room, "--listen", &address]);
+    host.says("is served at");
+    let rows: &[(&[&str], &str)] = &[
+        (&["serve", "nowhere.rhai"], "cannot read nowhere.rhai: No such file or directory"),
+        (&["serve", &room, "--listen", &address], &format!("cannot listen on {address}: Address already in use")),
+        (&["serve", &room, "--listen", "tcp/0.0.0.0:0"], "can be reached from other machines without encryption"),
+        (&["serve", &room, "--listen", "tls/127.0.0.1:1"], "tls needs --certificates"),
+        (&["serve", &room, "--listen", "tls/127.0.0.1:1", "--certificates", "nowhere"], "nowhere/authority.pem: No such file"),
+        (&["serve", &room, "--listen", "tls/127.0.0.1:1", "--certificates", &folder], "authority.pem: this is no certificate"),
+        (&["join", "nowhere.rhai"], "cannot read nowhere.rhai"),
+        (&["join", &room, "--connect", "tcp/10.0.0.1:7447"], "can be reached from other machines without encryption"),
+        (
+            &["display", "--headless", "--once", "--show", "wal", "--connect", &address],
+            "there is no display or viewpoint `wal`; did you mean `wall`?; there are: wall",
+        ),
+    ];
+    for (args, expected) in rows {
+        let mut process = Process::start(args);
+        assert_eq!(process.ends(), 1, "{args:?}: {}", process.said());
+        process.says(expected);
+    }
+    let lonely = Process::start(&["join", &room, "--connect", "tcp/127.0.0.1:9"]);
+    lonely.says("no application answers at tcp/127.0.0.1:9 yet; waiting for it");
+}
+
+#[test]
+fn strangers_are_refused_and_told_of() {
+    let (folder, address) = prepare("strangers", &[("room.rhai", ROOM), ("guest.rhai", "world.add(group([]));")]);
+    let [ours, theirs] = ["ours", "theirs"].map(|name| folder.join(name).to_string_lossy().into_owned());
+    let [room, guest] = ["room.rhai", "guest.rhai"].map(|name| folder.join(name).to_string_lossy().into_owned());
+    for made in [&ours, &theirs] {
+        let _ = std::fs::remove_dir_all(made);
+        assert_eq!(Process::start(&["certs", made]).ends(), 0);
+    }
+    let address = address.replace("tcp/", "tls/");
+    let host = Process::start(&["serve", &room, "--listen", &address, "--certificates", &ours]);
+    host.says("is served at");
+    let friend = Process::start(&["join", &guest, "--name", "friend", "--connect", &address, "--certificates", &ours]);
+    friend.says("is in the world of `room`");
+    let stranger = Process::start(&["join", &guest, "--name", "stranger", "--connect", &address, "--certificates", &theirs]);
+    host.says("a connection was refused: it does not know the authority of our certificate");
+    let mut plain = std::net::TcpStream::connect(address.trim_start_matches("tls/")).unwrap();
+    std::io::Write::write_all(&mut plain, b"GET / HTTP/1.0\r\n\r\n").unwrap();
+    host.says("a connection was refused: it does not speak TLS");
+    assert!(!stranger.said().contains("is in the world"), "{}", stranger.said());
+}

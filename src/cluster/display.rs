@@ -1,5 +1,7 @@
 //! A display process.
 
+use super::interrupt::Interrupt;
+use super::join::SILENCE;
 use super::screen::Canvas;
 use super::{Failure, security};
 use crate::cli;
@@ -13,7 +15,7 @@ const PATIENCE_S: u64 = 60;
 /// Follows an application until it ends, or for ever.
 pub(crate) fn display(args: &cli::Display) -> Result<usize, Failure> {
     let types: Vec<NodeType> = umbriel_scenegraph::node_types().into_iter().chain(builtin_types()).collect();
-    let mut canvas = Canvas::new(&args.show, &args.assets, args.out.as_deref())?;
+    let mut canvas = Canvas::new(&args.show, args.out.as_deref())?;
     let options = FollowerOptions {
         endpoint: args.connect.clone(),
         security: security(&args.link),
@@ -25,8 +27,13 @@ pub(crate) fn display(args: &cli::Display) -> Result<usize, Failure> {
     let mut corrupt_after = args.corrupt;
     // What is corrupted shows in a frame that comes after it.
     let patience = Duration::from_millis(if args.corrupt.is_some() { 1 } else { 50 });
-    while !follower.is_over() {
+    let mut is_told = false;
+    let interrupt = Interrupt::watch()?;
+    while !follower.is_over() && !interrupt.came() {
         follower.run(&mut canvas, patience).inspect_err(|_| println!("{}", summary(&follower)))?;
+        if !follower.found_application() && started.elapsed() > SILENCE && !std::mem::replace(&mut is_told, true) {
+            tracing::warn!("no application answers at {} yet; waiting for it", args.connect);
+        }
         if args.once && !follower.found_application() && started.elapsed() > Duration::from_secs(PATIENCE_S) {
             return Err(ClusterError::silent(&args.connect, PATIENCE_S, args.link.certificates.is_some()).into());
         }

@@ -113,10 +113,9 @@ impl Launcher<'_> {
     }
 
     pub(super) fn spawn(&self, show: &str, port: u16, is_first: bool) -> Result<Child, Failure> {
-        let assets = self.args.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let mut command = Command::new(std::env::current_exe()?);
         command.args(["display", "--headless", "--once", "--show", show]);
-        command.args(["--connect", &format!("tcp/127.0.0.1:{port}")]).arg("--assets").arg(assets);
+        command.args(["--connect", &format!("tcp/127.0.0.1:{port}")]);
         command.args(["--lease-ms", &lease(self.args).as_millis().to_string()]);
         if self.args.check {
             command.arg("--out").arg(self.folder.join(file_name(show)));

@@ -3,14 +3,16 @@
 use super::interrupt::Interrupt;
 use super::{Failure, security};
 use crate::cli::{self, OnLeave};
+use crate::session::folder_of;
 use std::time::{Duration, Instant};
 use umbriel_displays::cluster::{ClusterError, Guest, News, Whose, Wish};
+use umbriel_scenegraph::Embedder;
 use umbriel_scripts::{Request, Sharing, World, shared_graph};
 
 /// How long who ends with the other application waits for its first word.
 const PATIENCE_S: u64 = 60;
 /// After so long without an answer, that is told.
-const SILENCE: Duration = Duration::from_secs(2);
+pub(super) const SILENCE: Duration = Duration::from_secs(2);
 
 /// Runs until the last frame, until Ctrl-C, or for ever.
 pub(crate) fn join(args: &cli::Join) -> Result<usize, Failure> {
@@ -23,6 +25,7 @@ pub(crate) fn join(args: &cli::Join) -> Result<usize, Failure> {
     let mut guest = Guest::connect(&args.connect, &security(&args.link), &name, keeps, shared_graph)?;
     let interrupt = Interrupt::watch()?;
     let started = Instant::now();
+    let mut embedder = Embedder::new(folder_of(&args.path));
     let (mut world, mut frames, mut problems, mut is_told): (Option<World>, u64, usize, bool) = (None, 0, 0, false);
     while !interrupt.came() && args.frames.is_none_or(|most| frames < most) {
         match guest.next(Duration::from_millis(50))? {
@@ -44,7 +47,8 @@ pub(crate) fn join(args: &cli::Join) -> Result<usize, Failure> {
                 let (graph, whose) = guest.enter();
                 let mut fresh = World::join_file(&args.path, graph, sharing(&name, whose))?;
                 tracing::info!("`{name}` is in the world of `{}` from frame {} on", guest.host(), guest.frame());
-                tell(&mut guest, &mut fresh);
+                embedder = Embedder::new(folder_of(&args.path));
+                tell(&mut guest, &mut fresh, &mut embedder);
                 problems += report(&mut fresh);
                 world = Some(fresh);
             }
@@ -53,7 +57,7 @@ pub(crate) fn join(args: &cli::Join) -> Result<usize, Failure> {
                 frames += 1;
                 follow(&mut guest, world);
                 world.step_shared(time_s);
-                tell(&mut guest, world);
+                tell(&mut guest, world, &mut embedder);
                 problems += report(world);
             }
         }
@@ -94,7 +98,7 @@ fn follow(guest: &mut Guest, world: &mut World) {
 }
 
 /// Tells what the script did and what it asks for.
-fn tell(guest: &mut Guest, world: &mut World) {
+fn tell(guest: &mut Guest, world: &mut World, embedder: &mut Embedder) {
     let requests = world.sharing_mut().map(|mut sharing| std::mem::take(&mut sharing.requests)).unwrap_or_default();
     let wishes: Vec<Wish> = requests
         .into_iter()
@@ -105,6 +109,7 @@ fn tell(guest: &mut Guest, world: &mut World) {
         })
         .collect();
     let whose = whose(world);
+    embedder.update(world.graph_mut(), &|node| !whose.owners.contains_key(&node));
     guest.tell(world.graph_mut(), &whose, &wishes);
     put_back(world, whose);
 }

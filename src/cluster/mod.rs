@@ -6,12 +6,14 @@ mod harness;
 mod interrupt;
 mod join;
 mod maps_once;
+mod refusals;
 mod screen;
 mod serve;
 
 pub(crate) use display::display;
 pub(crate) use harness::run;
 pub(crate) use join::join;
+pub(crate) use refusals::Refusals;
 pub(crate) use serve::serve;
 
 use crate::cli;

@@ -57,7 +57,6 @@ pub(super) fn channel(picture: &Picture, channel: usize) -> Option<Picture> {
 /// A display without a window.
 pub(super) struct Canvas {
     show: String,
-    assets: PathBuf,
     out: Option<PathBuf>,
     device: String,
     renderer: Renderer,
@@ -70,11 +69,10 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    pub(super) fn new(show: &str, assets: &Path, out: Option<&Path>) -> Result<Canvas, Failure> {
+    pub(super) fn new(show: &str, out: Option<&Path>) -> Result<Canvas, Failure> {
         let gpu = Gpu::new(None)?;
         Ok(Canvas {
             show: show.into(),
-            assets: assets.to_path_buf(),
             out: out.map(Path::to_path_buf),
             device: describe(&gpu),
             renderer: Renderer::new(&gpu)?,
@@ -106,7 +104,7 @@ impl Screen for Canvas {
 
     fn draw(&mut self, graph: &Graph, _frame: u64, is_new: bool) -> Result<(), ScreenError> {
         if is_new {
-            self.extractor = Extractor::new().with_asset_root(&self.assets).with_ready_casters();
+            self.extractor = Extractor::new().with_ready_casters();
             self.scene = Scene::default();
             self.rig.refit();
             self.whole.refit();

@@ -79,6 +79,7 @@ fn step_with(
     }
     session.evaluate(time_s);
     once.find(session.graph());
+    session.embed();
     if let Some(desk) = &mut desk {
         desk.publish(host, session.graph());
     }

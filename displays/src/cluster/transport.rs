@@ -122,9 +122,10 @@ fn files(folder: &Path, end: End) -> Result<[String; 3], ClusterError> {
     let names = ["authority.pem".to_string(), format!("{stem}.pem"), format!("{stem}.key.pem")];
     let [authority, certificate, key] = names.map(|name| {
         let path = folder.join(name);
-        match std::fs::read(&path) {
-            Ok(_) => Ok(path.to_string_lossy().into_owned()),
-            Err(error) => Err(ClusterError::Certificate { path, fault: error.to_string() }),
+        let fault = std::fs::read(&path).map_or_else(|error| Some(error.to_string()), |bytes| fault_of(&bytes));
+        match fault {
+            None => Ok(path.to_string_lossy().into_owned()),
+            Some(fault) => Err(ClusterError::Certificate { path, fault }),
         }
     });
     Ok([authority?, certificate?, key?])
@@ -133,6 +134,20 @@ fn files(folder: &Path, end: End) -> Result<[String; 3], ClusterError> {
 /// How long a link may give no sign of life before it counts as broken, and is made anew. Machines that are so busy that even this takes
 /// longer want more.
 pub const LEASE: Duration = Duration::from_secs(1);
+
+/// What is wrong with a certificate or a key, if anything is.
+fn fault_of(bytes: &[u8]) -> Option<String> {
+    let Ok((_, pem)) = x509_parser::pem::parse_x509_pem(bytes) else {
+        return Some("this is no certificate and no key (PEM)".into());
+    };
+    if pem.label.ends_with("PRIVATE KEY") {
+        return None;
+    }
+    let Ok(certificate) = pem.parse_x509() else { return Some("the certificate is damaged".into()) };
+    let validity = certificate.validity();
+    (!validity.is_valid())
+        .then(|| format!("the certificate is valid from {} to {} only", validity.not_before, validity.not_after))
+}
 
 /// Settings that were measured: see `docs/performance.md`. Nobody is searched for, and nobody is told of others.
 pub(super) fn open(endpoint: &str, security: &Security, end: End, lease: Duration) -> Result<Session, ClusterError> {
@@ -199,6 +214,34 @@ fn json_string(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn certificates_are_checked() {
+        let key = rcgen::KeyPair::generate().unwrap();
+        let of_years = |from, to| {
+            let mut params = rcgen::CertificateParams::new(vec!["display".to_string()]).unwrap();
+            (params.not_before, params.not_after) = (rcgen::date_time_ymd(from, 1, 1), rcgen::date_time_ymd(to, 1, 1));
+            params.self_signed(&key).unwrap().pem()
+        };
+        let damaged = of_years(2020, 2049).replacen("MII", "MIJ", 1);
+        let rows = [
+            (of_years(2020, 2049), None),
+            (key.serialize_pem(), None),
+            (of_years(2001, 2002), Some("valid from Jan  1 00:00:00 2001")),
+            (of_years(2048, 2049), Some("valid from Jan  1 00:00:00 2048")),
+            ("garbage".into(), Some("no certificate")),
+            (String::new(), Some("no certificate")),
+            (damaged, Some("damaged")),
+        ];
+        for (text, expected) in rows {
+            let fault = fault_of(text.as_bytes());
+            match (&fault, expected) {
+                (None, None) => {}
+                (Some(fault), Some(part)) => assert!(fault.contains(part), "{fault}"),
+                _ => panic!("{fault:?} is not {expected:?}"),
+            }
+        }
+    }
 
     #[test]
     fn endpoints_are_checked() {

@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 /// The file that a relative address names; nothing outside of the root.
-pub(super) fn below(root: &Path, url: &str) -> Result<PathBuf, String> {
+pub(crate) fn below(root: &Path, url: &str) -> Result<PathBuf, String> {
     let relative = Path::new(url);
     if relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir)) {
         Ok(root.join(relative))

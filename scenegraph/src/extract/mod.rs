@@ -8,7 +8,7 @@
 mod contours;
 mod dirty;
 mod drawable;
-mod files;
+pub(crate) mod files;
 mod instance;
 mod layer;
 mod light;
@@ -35,6 +35,7 @@ mod tests;
 pub use map_settings::wants_map_once;
 pub use problem::Problem;
 pub use room::Viewpoint;
+pub(crate) use texture::decode;
 
 use dirty::Dirty;
 use drawable::Slots;

@@ -62,7 +62,7 @@ impl Pictures {
     }
 }
 
-fn decode(path: &Path) -> Result<Image, String> {
+pub(crate) fn decode(path: &Path) -> Result<Image, String> {
     let mut reader = image::ImageReader::open(path).and_then(|r| r.with_guessed_format()).map_err(|e| e.to_string())?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
