@@ -47,6 +47,8 @@ fn in_words(reason: &str) -> String {
         ("UnknownIssuer", "its certificate is of another authority"),
         ("BadSignature", "its certificate is of another authority"),
         ("UnknownCA", "it does not know the authority of our certificate"),
+        // Authorities that we made have one name; what tells them apart is the signature.
+        ("DecryptError", "it does not know the authority of our certificate"),
         ("InvalidContentType", "it does not speak TLS"),
         ("expired", "its certificate is out of date"),
         ("not valid yet", "its certificate is not valid yet"),
