@@ -1,23 +1,20 @@
 //! A display's end: follows the application's frames, has them drawn, and shown on release.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, Instant};
 
-use crossbeam::channel::{Receiver, Sender, unbounded};
 use umbriel_fields::replica::{Bulk, Packet, Replica};
 use umbriel_fields::{Graph, TypeRegistry};
-use zenoh::liveliness::LivelinessToken;
-use zenoh::pubsub::{Publisher as ZenohPublisher, Subscriber};
+use zenoh::Wait;
+use zenoh::pubsub::Publisher as ZenohPublisher;
 use zenoh::qos::{CongestionControl, Priority};
-use zenoh::sample::SampleKind;
-use zenoh::{Session, Wait};
 
+use super::line::{Answer, Line};
 use super::lock::{DisplayAction, DisplayEvent, DisplayLock};
 use super::message::{
-    APPLICATION, BULK, DISPLAY, FRAME, INPUT, Input, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, bytes_of,
-    message_of, unstamped,
+    DISPLAY, FRAME, INPUT, Input, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, bytes_of, message_of, unstamped,
 };
-use super::transport::{ClusterError, End, Security, open};
+use super::transport::{ClusterError, Security, network};
 
 /// Draws and shows what a follower follows.
 pub trait Screen {
@@ -58,8 +55,8 @@ pub struct FollowerReport {
 enum Arrived {
     Frame(Vec<u8>),
     Release(Vec<u8>),
-    Snapshot(Result<Vec<u8>, String>),
-    Bulk(u64, Result<Vec<u8>, String>),
+    Snapshot(Answer),
+    Bulk(u64, Answer),
     Application(bool),
 }
 
@@ -71,22 +68,18 @@ enum Parked {
 
 /// A display process in the lock.
 pub struct Follower {
-    session: Session,
+    line: Line<Arrived>,
     name: String,
-    number: u64,
     types: TypeRegistry,
     ready: ZenohPublisher<'static>,
     input: ZenohPublisher<'static>,
     inputs: u64,
-    arrived: Receiver<Arrived>,
-    sender: Sender<Arrived>,
     lock: DisplayLock,
     replica: Option<Replica>,
     /// One that differs from the application, until it is known where.
     doubted: Option<Replica>,
     is_new: bool,
     bulk: Bulk,
-    asked: BTreeSet<u64>,
     parked: VecDeque<Parked>,
     packets: BTreeMap<u64, Vec<u8>>,
     snapshot: Vec<u8>,
@@ -103,11 +96,6 @@ pub struct Follower {
     drawn_hash: u64,
     drawn_frame: u64,
     report: FollowerReport,
-    _held: (Vec<Subscriber<()>>, LivelinessToken),
-}
-
-fn network(error: zenoh::Error) -> ClusterError {
-    ClusterError::Network(error.to_string())
 }
 
 /// A display that crashed and comes back at once finds its own name taken until its old link is given up.
@@ -119,43 +107,26 @@ impl Follower {
     /// Joins the application, now or as soon as it is there. `name` is that of the display; `types` are those that can
     /// be drawn.
     pub fn connect(options: FollowerOptions, name: &str, types: impl Into<TypeRegistry>) -> Result<Follower, ClusterError> {
-        let session = open(&options.endpoint, &options.security, End::Display, options.lease)?;
-        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
-        let number = since ^ (std::process::id() as u64) << 40;
-        let (sender, arrived) = unbounded();
-        let mut subscribers = Vec::new();
-        for (key, kind) in [(FRAME, Arrived::Frame as fn(Vec<u8>) -> Arrived), (RELEASE, Arrived::Release)] {
-            let sender = sender.clone();
-            let take = move |sample: zenoh::sample::Sample| drop(sender.send(kind(sample.payload().to_bytes().into_owned())));
-            subscribers.push(session.declare_subscriber(key).callback(take).wait().map_err(network)?);
-        }
-        let application = sender.clone();
-        let alive = session.liveliness().declare_subscriber(APPLICATION).history(true).callback(move |sample| {
-            let _ = application.send(Arrived::Application(sample.kind() == SampleKind::Put));
-        });
-        subscribers.push(alive.wait().map_err(network)?);
+        let subjects = [(FRAME, Arrived::Frame as fn(Vec<u8>) -> Arrived), (RELEASE, Arrived::Release)];
+        let mut line = Line::open(&options.endpoint, &options.security, options.lease, subjects, Arrived::Application)?;
         let declare = |key: &'static str| {
-            let publisher = session.declare_publisher(key).congestion_control(CongestionControl::Drop);
+            let publisher = line.session.declare_publisher(key).congestion_control(CongestionControl::Drop);
             publisher.priority(Priority::RealTime).express(true).wait().map_err(network)
         };
         let (ready, input) = (declare(READY)?, declare(INPUT)?);
-        let token = session.liveliness().declare_token(format!("{DISPLAY}/{number}")).wait().map_err(network)?;
+        line.announce(DISPLAY)?;
         Ok(Follower {
-            session,
+            line,
             name: name.into(),
-            number,
             types: types.into(),
             ready,
             input,
             inputs: 0,
-            arrived,
-            sender,
             lock: DisplayLock::new(),
             replica: None,
             doubted: None,
             is_new: true,
             bulk: Bulk::new(),
-            asked: BTreeSet::new(),
             parked: VecDeque::new(),
             packets: BTreeMap::new(),
             snapshot: Vec::new(),
@@ -169,7 +140,6 @@ impl Follower {
             drawn_hash: 0,
             drawn_frame: 0,
             report: FollowerReport::default(),
-            _held: (subscribers, token),
         })
     }
 
@@ -211,9 +181,9 @@ impl Follower {
         let until = Instant::now() + patience;
         loop {
             let left = until.saturating_duration_since(Instant::now());
-            if let Ok(arrived) = self.arrived.recv_timeout(left.min(Duration::from_millis(5))) {
+            if let Ok(arrived) = self.line.arrived.recv_timeout(left.min(Duration::from_millis(5))) {
                 self.handle(arrived, screen)?;
-                while let Ok(arrived) = self.arrived.try_recv() {
+                while let Ok(arrived) = self.line.arrived.try_recv() {
                     self.handle(arrived, screen)?;
                 }
             }
@@ -236,7 +206,7 @@ impl Follower {
                         self.parked.clear();
                         self.step(DisplayEvent::Release { epoch, frame: 0, is_mine: false }, screen)?;
                     }
-                    self.ask(missing);
+                    self.line.ask_for_bulk(missing, Arrived::Bulk);
                     if epoch == self.lock.epoch() {
                         self.packets.insert(frame, bytes);
                         self.parked.push_back(Parked::Frame(epoch, frame));
@@ -248,7 +218,7 @@ impl Follower {
             },
             Arrived::Release(bytes) => match message_of::<Release>(&bytes) {
                 Ok(release) => {
-                    let is_mine = release.may_show.contains(&self.number);
+                    let is_mine = release.may_show.contains(&self.line.id);
                     self.unpark(screen)?;
                     self.step(DisplayEvent::Release { epoch: release.epoch, frame: release.frame, is_mine }, screen)?;
                     self.is_over |= self.ends_with_application && release.is_last && release.epoch == self.lock.epoch();
@@ -260,7 +230,7 @@ impl Follower {
                 let (epoch, packet) = unstamped(&bytes).ok_or_else(|| ClusterError::Message("a snapshot is empty".into()))?;
                 let packet = Packet::read(packet).map_err(ClusterError::from)?;
                 let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
-                self.ask(missing);
+                self.line.ask_for_bulk(missing, Arrived::Bulk);
                 self.snapshot = bytes;
                 self.parked.retain(|parked| matches!(parked, Parked::Frame(..)));
                 self.parked.push_front(Parked::Snapshot(epoch, frame));
@@ -274,13 +244,13 @@ impl Follower {
             Arrived::Snapshot(Err(reason)) if reason.starts_with("it ") => return Err(ClusterError::Refused(reason).into()),
             Arrived::Snapshot(Err(reason)) => tracing::debug!("no snapshot: {reason}"),
             Arrived::Bulk(hash, Ok(bytes)) => {
-                self.asked.remove(&hash);
+                self.line.bulk_answered(hash);
                 if let Err(error) = self.bulk.learn(hash, &bytes) {
                     tracing::error!("{error}");
                 }
             }
             Arrived::Bulk(hash, Err(reason)) => {
-                self.asked.remove(&hash);
+                self.line.bulk_answered(hash);
                 tracing::debug!("no long value {hash:016x}: {reason}");
                 // What waits for it is of the past: a snapshot knows what is needed now.
                 self.parked.clear();
@@ -315,28 +285,6 @@ impl Follower {
         Ok(())
     }
 
-    fn ask(&mut self, missing: Vec<u64>) {
-        for hash in missing {
-            if self.asked.insert(hash) {
-                self.get(format!("{BULK}/{hash:016x}"), Vec::new(), move |answer| Arrived::Bulk(hash, answer));
-            }
-        }
-    }
-
-    fn get(&self, key: String, payload: Vec<u8>, arrived: impl Fn(Result<Vec<u8>, String>) -> Arrived + Send + Sync + 'static) {
-        let sender = self.sender.clone();
-        let sent = self.session.get(key).payload(payload).timeout(Duration::from_secs(5)).callback(move |reply| {
-            let answer = match reply.into_result() {
-                Ok(sample) => Ok(sample.payload().to_bytes().into_owned()),
-                Err(error) => Err(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()),
-            };
-            let _ = sender.send(arrived(answer));
-        });
-        if let Err(error) = sent.wait() {
-            tracing::debug!("cannot ask: {error}");
-        }
-    }
-
     fn step<S: Screen>(&mut self, event: DisplayEvent, screen: &mut S) -> Result<(), S::Error> {
         let mut events = VecDeque::from([event]);
         while let Some(event) = events.pop_front() {
@@ -344,8 +292,8 @@ impl Follower {
             for action in self.lock.step(now_us, event) {
                 match action {
                     DisplayAction::Fetch => {
-                        let join = Join { protocol: PROTOCOL, display: self.number, name: self.name.clone() };
-                        self.get(SNAPSHOT.into(), bytes_of(&join), Arrived::Snapshot);
+                        let join = Join { protocol: PROTOCOL, display: self.line.id, name: self.name.clone() };
+                        self.line.get(SNAPSHOT.into(), bytes_of(&join), Arrived::Snapshot);
                     }
                     DisplayAction::Restore(frame) => {
                         self.restore()?;
@@ -367,7 +315,7 @@ impl Follower {
                         let hash = self.drawn_hash;
                         let name = self.name.clone();
                         let (epoch, took_us) = (self.lock.epoch(), self.took.as_micros() as u64);
-                        let ready = Ready { display: self.number, name, epoch, frame, took_us, hash };
+                        let ready = Ready { display: self.line.id, name, epoch, frame, took_us, hash };
                         if let Err(error) = self.ready.put(bytes_of(&ready)).wait() {
                             tracing::debug!("cannot say ready: {error}");
                         }

@@ -19,7 +19,7 @@ use super::message::{
     APPLICATION, BULK, DISPLAY, FRAME, INPUT, Input, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, bytes_of,
     message_of, stamped,
 };
-use super::transport::{ClusterError, End, Security, open};
+use super::transport::{ClusterError, End, Security, network, open};
 
 /// How an application is reached.
 #[derive(Clone, Debug)]
@@ -101,10 +101,6 @@ pub struct Host {
     report: HostReport,
     _held: (Vec<Subscriber<()>>, Vec<Queryable<()>>, LivelinessToken),
     session: Session,
-}
-
-fn network(error: zenoh::Error) -> ClusterError {
-    ClusterError::Network(error.to_string())
 }
 
 impl Host {

@@ -14,6 +14,8 @@ mod follower;
 #[cfg(feature = "cluster")]
 mod host;
 #[cfg(feature = "cluster")]
+mod line;
+#[cfg(feature = "cluster")]
 mod message;
 #[cfg(feature = "cluster")]
 mod proxy;

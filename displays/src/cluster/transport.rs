@@ -149,6 +149,11 @@ fn fault_of(bytes: &[u8]) -> Option<String> {
         .then(|| format!("the certificate is valid from {} to {} only", validity.not_before, validity.not_after))
 }
 
+/// What the network library says.
+pub(super) fn network(error: zenoh::Error) -> ClusterError {
+    ClusterError::Network(error.to_string())
+}
+
 /// Settings that were measured: see `docs/performance.md`. Nobody is searched for, and nobody is told of others.
 pub(super) fn open(endpoint: &str, security: &Security, end: End, lease: Duration) -> Result<Session, ClusterError> {
     check(endpoint, security)?;

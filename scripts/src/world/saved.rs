@@ -10,7 +10,7 @@ use rhai::Dynamic;
 use umbriel_fields::save::{self, SaveError};
 use umbriel_fields::{Field, Graph, NodeId, NodeType};
 
-use super::{Script, Settings, World, empty, load};
+use super::{Script, Settings, World, empty, folder_of, load};
 use crate::definition::{BEHAVIOUR, Behaviour, Definition, FRAME_TIME, SCRIPT_TYPE};
 use crate::error::{Problem, ScriptError};
 use crate::stage::{Node, Stage};
@@ -74,8 +74,8 @@ fn script_of(graph: &Graph) -> Option<String> {
 }
 
 fn open(path: &Path, data: &[u8], settings: &Settings) -> Result<(Graph, Script, Vec<Problem>), SaveError> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let (bare, script) = empty(settings, Some(folder));
+    let folder = folder_of(path).unwrap_or_default();
+    let (bare, script) = empty(settings, Some(&folder));
     let (graph, reports) = save::load(data, bare.types().clone())?;
     let mut problems = Vec::new();
     let (graph, script, reports) = match script_of(&graph).map(|url| folder.join(url)) {

@@ -16,6 +16,7 @@ use super::ownership::{GuestId, Ownership, OwnershipAction, OwnershipEvent};
 use crate::cluster::message::{
     DEEDS, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word, bytes_of, message_of,
 };
+use crate::cluster::transport::network;
 use crate::cluster::{ClusterError, Host};
 
 /// How long a guest that cannot be reached keeps its nodes and locks.
@@ -47,10 +48,6 @@ pub struct Desk {
     changed: BTreeSet<u64>,
     word: Word,
     _held: (Vec<Subscriber<()>>, Queryable<()>),
-}
-
-fn network(error: zenoh::Error) -> ClusterError {
-    ClusterError::Network(error.to_string())
 }
 
 impl Desk {

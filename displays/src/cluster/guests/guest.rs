@@ -2,22 +2,20 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
-use crossbeam::channel::{Receiver, Sender, unbounded};
 use umbriel_fields::replica::{Bulk, Mirror, Packet, Replica};
 use umbriel_fields::{Graph, NodeId, TypeRegistry};
-use zenoh::liveliness::LivelinessToken;
-use zenoh::pubsub::{Publisher as ZenohPublisher, Subscriber};
+use zenoh::Wait;
+use zenoh::pubsub::Publisher as ZenohPublisher;
 use zenoh::qos::CongestionControl;
-use zenoh::sample::SampleKind;
-use zenoh::{Session, Wait};
 
+use crate::cluster::line::{Answer, Line};
 use crate::cluster::message::{
-    APPLICATION, BULK, DEEDS, FRAME, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word,
-    bytes_of, message_of, unstamped,
+    DEEDS, FRAME, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word, bytes_of, message_of,
+    unstamped,
 };
-use crate::cluster::transport::{End, open};
+use crate::cluster::transport::network;
 use crate::cluster::{ClusterError, LEASE, Security};
 
 /// What is not confirmed after so long is sent again.
@@ -56,8 +54,8 @@ pub enum Wish {
 enum Arrived {
     Frame(Vec<u8>),
     Word(Vec<u8>),
-    World(Result<Vec<u8>, String>),
-    Bulk(u64, Result<Vec<u8>, String>),
+    World(Answer),
+    Bulk(u64, Answer),
     Host(bool),
 }
 
@@ -74,19 +72,15 @@ pub struct Whose {
 
 /// An application in another one's world.
 pub struct Guest {
-    session: Session,
-    id: u64,
+    line: Line<Arrived>,
     name: Arc<str>,
     keeps: bool,
-    arrived: Receiver<Arrived>,
-    sender: Sender<Arrived>,
     deeds: ZenohPublisher<'static>,
     fresh: fn() -> Graph,
     /// The one that is entered next, and the types of the one that was entered.
     graph: Graph,
     types: TypeRegistry,
     bulk: Bulk,
-    asked_bulk: BTreeSet<u64>,
     epoch: u64,
     replica: Option<Replica>,
     mirror: Option<Mirror>,
@@ -106,11 +100,6 @@ pub struct Guest {
     asked: Option<Instant>,
     refused_since: Option<Instant>,
     is_leaving: bool,
-    _held: (Vec<Subscriber<()>>, LivelinessToken),
-}
-
-fn network(error: zenoh::Error) -> ClusterError {
-    ClusterError::Network(error.to_string())
 }
 
 impl Guest {
@@ -123,36 +112,19 @@ impl Guest {
         keeps: bool,
         fresh: fn() -> Graph,
     ) -> Result<Guest, ClusterError> {
-        let session = open(endpoint, security, End::Display, LEASE)?;
-        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
-        let id = since ^ (std::process::id() as u64) << 40;
-        let (sender, arrived) = unbounded();
-        let mut subscribers = Vec::new();
-        for (key, kind) in [(FRAME, Arrived::Frame as fn(Vec<u8>) -> Arrived), (WORD, Arrived::Word)] {
-            let sender = sender.clone();
-            let take = move |sample: zenoh::sample::Sample| drop(sender.send(kind(sample.payload().to_bytes().into_owned())));
-            subscribers.push(session.declare_subscriber(key).callback(take).wait().map_err(network)?);
-        }
-        let host = sender.clone();
-        let alive = session.liveliness().declare_subscriber(APPLICATION).history(true).callback(move |sample| {
-            let _ = host.send(Arrived::Host(sample.kind() == SampleKind::Put));
-        });
-        subscribers.push(alive.wait().map_err(network)?);
-        let deeds = session.declare_publisher(DEEDS).congestion_control(CongestionControl::Block).wait().map_err(network)?;
-        let token = session.liveliness().declare_token(format!("{GUEST}/{id}")).wait().map_err(network)?;
+        let subjects = [(FRAME, Arrived::Frame as fn(Vec<u8>) -> Arrived), (WORD, Arrived::Word)];
+        let mut line = Line::open(endpoint, security, LEASE, subjects, Arrived::Host)?;
+        let deeds = line.session.declare_publisher(DEEDS).congestion_control(CongestionControl::Block).wait().map_err(network)?;
+        line.announce(GUEST)?;
         Ok(Guest {
-            session,
-            id,
+            line,
             name: name.into(),
             keeps,
-            arrived,
-            sender,
             deeds,
             fresh,
             graph: fresh(),
             types: TypeRegistry::new(),
             bulk: Bulk::new(),
-            asked_bulk: BTreeSet::new(),
             epoch: 0,
             replica: None,
             mirror: None,
@@ -170,7 +142,6 @@ impl Guest {
             asked: None,
             refused_since: None,
             is_leaving: false,
-            _held: (subscribers, token),
         })
     }
 
@@ -198,12 +169,12 @@ impl Guest {
         loop {
             let left = until.saturating_duration_since(Instant::now());
             let mut news = News::None;
-            let mut arrived = self.arrived.recv_timeout(left.min(Duration::from_millis(5))).ok();
+            let mut arrived = self.line.arrived.recv_timeout(left.min(Duration::from_millis(5))).ok();
             while let Some(next) = arrived {
                 if let Some(found) = self.handle(next)? {
                     news = found;
                 }
-                arrived = self.arrived.try_recv().ok();
+                arrived = self.line.arrived.try_recv().ok();
             }
             self.ask_for_the_world();
             self.resend();
@@ -223,7 +194,7 @@ impl Guest {
                 match frame {
                     Some((epoch, Ok(packet))) if epoch == self.epoch => {
                         let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
-                        self.ask_for_bulk(missing);
+                        self.line.ask_for_bulk(missing, Arrived::Bulk);
                         self.packets.insert(frame, bytes);
                     }
                     Some((_, Err(error))) => tracing::error!("a frame cannot be used: {error}"),
@@ -232,7 +203,7 @@ impl Guest {
             }
             Arrived::Word(bytes) => match message_of::<Word>(&bytes) {
                 Ok(word) if word.epoch == self.epoch => {
-                    if self.replica.is_some() && !word.guests.iter().any(|(id, ..)| *id == self.id) {
+                    if self.replica.is_some() && !word.guests.iter().any(|(id, ..)| *id == self.line.id) {
                         // It was given up: its nodes are gone, or the host's.
                         if !self.is_leaving {
                             tracing::warn!("this application was away for too long; it joins anew");
@@ -258,7 +229,7 @@ impl Guest {
             Arrived::World(Err(reason)) if reason.starts_with("it ") => return Err(ClusterError::GuestRefused(reason)),
             Arrived::World(Err(reason)) => tracing::debug!("no world: {reason}"),
             Arrived::Bulk(hash, answer) => {
-                self.asked_bulk.remove(&hash);
+                self.line.bulk_answered(hash);
                 match answer {
                     Ok(bytes) => {
                         if let Err(error) = self.bulk.learn(hash, &bytes) {
@@ -302,30 +273,8 @@ impl Guest {
         let waits = self.replica.is_none() && self.world.is_none() && !self.is_leaving;
         if waits && self.asked.is_none_or(|asked| asked.elapsed() > ASK) {
             self.asked = Some(Instant::now());
-            let join = GuestJoin { protocol: PROTOCOL, guest: self.id, name: self.name.to_string(), keeps: self.keeps };
-            self.get(GUEST_SNAPSHOT.into(), bytes_of(&join), Arrived::World);
-        }
-    }
-
-    fn ask_for_bulk(&mut self, missing: Vec<u64>) {
-        for hash in missing {
-            if self.asked_bulk.insert(hash) {
-                self.get(format!("{BULK}/{hash:016x}"), Vec::new(), move |answer| Arrived::Bulk(hash, answer));
-            }
-        }
-    }
-
-    fn get(&self, key: String, payload: Vec<u8>, arrived: impl Fn(Result<Vec<u8>, String>) -> Arrived + Send + Sync + 'static) {
-        let sender = self.sender.clone();
-        let sent = self.session.get(key).payload(payload).timeout(Duration::from_secs(5)).callback(move |reply| {
-            let answer = match reply.into_result() {
-                Ok(sample) => Ok(sample.payload().to_bytes().into_owned()),
-                Err(error) => Err(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()),
-            };
-            let _ = sender.send(arrived(answer));
-        });
-        if let Err(error) = sent.wait() {
-            tracing::debug!("cannot ask: {error}");
+            let join = GuestJoin { protocol: PROTOCOL, guest: self.line.id, name: self.name.to_string(), keeps: self.keeps };
+            self.line.get(GUEST_SNAPSHOT.into(), bytes_of(&join), Arrived::World);
         }
     }
 
@@ -371,7 +320,7 @@ impl Guest {
             match (later, self.gap_since) {
                 (false, _) => self.gap_since = None,
                 (true, None) => self.gap_since = Some(Instant::now()),
-                (true, Some(since)) if since.elapsed() > GAP && self.asked_bulk.is_empty() => self.fetch_again(),
+                (true, Some(since)) if since.elapsed() > GAP && !self.line.awaits_bulk() => self.fetch_again(),
                 _ => {}
             }
         }
@@ -384,11 +333,11 @@ impl Guest {
         let packet = Packet::read(packet).inspect_err(|error| tracing::error!("the world cannot be used: {error}")).ok()?;
         let missing = packet.missing(&self.bulk);
         if !missing.is_empty() {
-            self.ask_for_bulk(missing);
+            self.line.ask_for_bulk(missing, Arrived::Bulk);
             return None;
         }
         let word = word.clone();
-        let applied = word.guests.iter().find(|(id, ..)| *id == self.id).map_or(0, |(.., applied)| *applied);
+        let applied = word.guests.iter().find(|(id, ..)| *id == self.line.id).map_or(0, |(.., applied)| *applied);
         let is_first = self.epoch != epoch || self.mirror.is_none() || applied < self.applied;
         if is_first {
             self.graph = (self.fresh)();
@@ -427,13 +376,13 @@ impl Guest {
         for word in &heard {
             self.host = word.host.as_str().into();
             self.names = word.guests.iter().map(|(id, name, _)| (*id, name.as_str().into())).collect();
-            for (_, key, number) in word.made.iter().filter(|(guest, ..)| *guest == self.id) {
+            for (_, key, number) in word.made.iter().filter(|(guest, ..)| *guest == self.line.id) {
                 mirror.made(*key, *number);
             }
-            if let Some((.., applied)) = word.guests.iter().find(|(id, ..)| *id == self.id) {
+            if let Some((.., applied)) = word.guests.iter().find(|(id, ..)| *id == self.line.id) {
                 self.applied = self.applied.max(*applied);
             }
-            for (_, why) in word.refused.iter().filter(|(guest, _)| *guest == self.id) {
+            for (_, why) in word.refused.iter().filter(|(guest, _)| *guest == self.line.id) {
                 tracing::error!("not done: {why}");
             }
         }
@@ -453,7 +402,7 @@ impl Guest {
                 let Some(node) = mirror.node(*number) else { continue };
                 let name = |guest: &u64| self.names.get(guest).cloned().unwrap_or_else(|| "?".into());
                 match owner {
-                    Some(owner) if *owner == self.id => drop(whose.owners.remove(&node)),
+                    Some(owner) if *owner == self.line.id => drop(whose.owners.remove(&node)),
                     Some(owner) => drop(whose.owners.insert(node, name(owner))),
                     None => drop(whose.owners.insert(node, self.host.clone())),
                 }
@@ -462,7 +411,7 @@ impl Guest {
                     None => drop(whose.locks.remove(&node)),
                 }
             }
-            for (_, number, answer) in word.answers.iter().filter(|(guest, ..)| *guest == self.id) {
+            for (_, number, answer) in word.answers.iter().filter(|(guest, ..)| *guest == self.line.id) {
                 if let Some(node) = mirror.node(*number).filter(|node| self.locks_asked.remove(node)) {
                     whose.answers.push((node, answer.clone()));
                 }
@@ -499,7 +448,7 @@ impl Guest {
 
     fn send(&mut self, deeds: Vec<umbriel_fields::replica::Deed>, images: Vec<(u64, Vec<u8>)>, requests: Vec<GuestRequest>) {
         self.sent += 1;
-        let bytes = bytes_of(&GuestMessage { guest: self.id, number: self.sent, deeds, images, requests });
+        let bytes = bytes_of(&GuestMessage { guest: self.line.id, number: self.sent, deeds, images, requests });
         if let Err(error) = self.deeds.put(bytes.clone()).wait() {
             tracing::debug!("cannot tell: {error}");
         }
