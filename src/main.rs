@@ -90,10 +90,7 @@ fn log() {
         .with_filter(filter);
     let all = tracing_subscriber::registry().with(text);
     #[cfg(feature = "cluster")]
-    let all = {
-        let theirs = Targets::new().with_target(cluster::Refusals::TARGET, tracing::Level::WARN);
-        all.with(cluster::Refusals.with_filter(theirs))
-    };
+    let all = { all.with(cluster::Refusals::default().with_filter(Targets::from_iter(cluster::Refusals::TARGETS))) };
     all.init();
 }
 

@@ -6,7 +6,7 @@ use glam::Vec3;
 use std::path::{Path, PathBuf};
 use umbriel_displays::WindowSizes;
 use umbriel_displays::navigation::{Input, NavigationNode};
-use umbriel_displays::rig::{Rig, Wanted};
+use umbriel_displays::rig::{Aim, Pointed, Pointers, Rig, Wanted};
 use umbriel_fields::{Graph, NodeId};
 use umbriel_scene::{Aabb, Picture, Samples, Scene};
 use umbriel_scenegraph::{Extractor, Viewpoint};
@@ -46,6 +46,7 @@ pub(crate) struct Session {
     /// Instead of what the world says.
     samples: Option<Samples>,
     navigation: Option<NavigationNode>,
+    pointers: Pointers,
     /// What was reported and not yet told.
     problems: Vec<String>,
     /// For replicas, which have no files.
@@ -88,6 +89,7 @@ impl Session {
             scene: Scene::default(),
             rig: Rig::new(),
             navigation: None,
+            pointers: Pointers::default(),
             problems: Vec::new(),
             #[cfg(feature = "cluster")]
             embedder: umbriel_scenegraph::Embedder::new(folder_of(path)),
@@ -165,6 +167,7 @@ impl Session {
             self.extractor = extractor_beside(&self.path, self.waits);
             self.scene = Scene::default();
             self.navigation = None;
+            self.pointers = Pointers::default();
             self.rig.refit();
         }
         self.extractor.update(self.source.graph(), &mut self.scene);
@@ -248,6 +251,21 @@ impl Session {
         let mut navigator = node.read(graph)?;
         navigator.step(input);
         node.write(graph, &navigator)
+    }
+
+    /// Takes notice of where the mouse on a display points.
+    pub(crate) fn point(&mut self, display: &str, aim: &Aim) {
+        if self.pointers.want(self.source.graph(), display) {
+            let node_of = |drawable| self.extractor.node_of_drawable(drawable);
+            let pointed = Pointed::find(aim, &self.scene, &self.extractor.world_from_room(), node_of);
+            self.pointed(display, &pointed);
+        }
+    }
+
+    /// Takes notice of what the mouse on a display points at.
+    pub(crate) fn pointed(&mut self, display: &str, pointed: &Pointed) {
+        let result = self.pointers.write(self.source.graph_mut(), display, pointed);
+        self.problems.extend(result.err().map(|e| e.to_string()));
     }
 
     /// Puts the room back to where it stands without navigation.

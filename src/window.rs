@@ -7,7 +7,8 @@ use crate::session::Session;
 use std::path::PathBuf;
 use umbriel_displays::WindowSizes;
 use umbriel_displays::navigation::Input;
-use umbriel_displays::window::{self, App, Command, Frame, Options};
+use umbriel_displays::rig::Aim;
+use umbriel_displays::window::{self, App, Command, Options, Stage};
 use umbriel_render::RgbaPixels;
 
 /// Opens the windows and runs until they are closed.
@@ -19,7 +20,7 @@ pub(crate) fn run(args: &Run) -> Result<(), Box<dyn std::error::Error>> {
     session.step(args.time);
     session.pictures(args.view.as_deref(), DESKTOP_SIZE, &WindowSizes::new())?; // a wrong --view ends here
     let mut viewer = Viewer { session, view: args.view.clone(), size: args.size, watched: Vec::new() };
-    let shown = window::run(&mut viewer, Options { start_s: args.time, frames: None });
+    let shown = window::run(&mut viewer, Options { start_s: args.time, ..Options::default() });
     if let Some(frames) = viewer.session.finish_recording()? {
         println!("{frames} frames recorded");
     }
@@ -59,27 +60,36 @@ impl Viewer {
 }
 
 impl App for Viewer {
-    fn frame(&mut self, time_s: f64, windows: &WindowSizes) -> Frame<'_> {
+    type Error = umbriel_displays::Error;
+
+    fn turn(&mut self, time_s: f64, stage: &mut Stage<'_>) -> Result<(), umbriel_displays::Error> {
         if !self.session.is_over() {
             self.session.step(time_s);
         }
         let size = self.size.unwrap_or(DESKTOP_SIZE);
-        let pictures = self.session.pictures(self.view.as_deref(), size, windows).or_else(|error| {
+        let windows = stage.sizes();
+        let pictures = self.session.pictures(self.view.as_deref(), size, &windows).or_else(|error| {
             // The named view went away with a reload.
             tracing::error!("{error}");
             self.view = None;
-            self.session.pictures(None, size, windows)
+            self.session.pictures(None, size, &windows)
         });
         self.tell();
         let pictures = pictures.unwrap_or_else(|error| {
             tracing::error!("{error}");
             Vec::new()
         });
-        Frame { scene: self.session.scene(), pictures }
+        let stats = stage.draw(self.session.scene(), pictures, None)?;
+        tracing::trace!(?stats, time_s, "frame");
+        stage.show()
     }
 
     fn navigate(&mut self, input: Input<'_>) {
         self.session.navigate(input);
+    }
+
+    fn point(&mut self, display: &str, aim: Aim) {
+        self.session.point(display, &aim);
     }
 
     fn command(&mut self, command: Command) {
@@ -110,11 +120,17 @@ impl App for Viewer {
     }
 
     fn screenshot(&mut self, name: &str, pixels: &RgbaPixels) {
-        let free = |n: u32| Some(PathBuf::from(format!("{}.{name}.{n:03}.png", self.session.name()))).filter(|p| !p.exists());
-        let Some(path) = (1..1000).find_map(free) else { return tracing::error!("a thousand screenshots are enough") };
-        match png::write(&path, pixels, "window") {
-            Ok(()) => tracing::info!("wrote {}", path.display()),
-            Err(error) => tracing::error!("{error}"),
-        }
+        screenshot(&self.session.name(), name, pixels);
+    }
+}
+
+/// Writes what a window shows to the first free of `WORLD.NAME.001.png`, `WORLD.NAME.002.png` and so on.
+pub(crate) fn screenshot(world: &str, name: &str, pixels: &RgbaPixels) {
+    let name = name.replace('/', "-");
+    let free = |n: u32| Some(PathBuf::from(format!("{world}.{name}.{n:03}.png"))).filter(|p| !p.exists());
+    let Some(path) = (1..1000).find_map(free) else { return tracing::error!("a thousand screenshots are enough") };
+    match png::write(&path, pixels, "window") {
+        Ok(()) => tracing::info!("wrote {}", path.display()),
+        Err(error) => tracing::error!("{error}"),
     }
 }

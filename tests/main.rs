@@ -2,8 +2,11 @@
 
 #[cfg(feature = "cluster")]
 mod applications;
+#[cfg(feature = "cluster")]
 mod cluster;
 mod command;
+#[cfg(all(target_os = "linux", feature = "cluster"))]
+mod display_window;
 mod layers;
 mod recording;
 mod shadows;

@@ -7,10 +7,12 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use umbriel_displays::cluster::{
-    ClusterError, Follower, FollowerOptions, Host, HostOptions, LEASE, Screen, Security, make_certificates,
+    ClusterError, Event, Follower, FollowerOptions, Guest, Host, HostOptions, LEASE, Proxy, Screen, Security, make_certificates,
 };
+use umbriel_displays::navigation::Input as Motion;
 use umbriel_fields::Graph;
 use umbriel_scenegraph::{new_graph, node_types};
+use zenoh::Wait;
 
 /// Remembers where the world stood in each frame that was shown.
 #[derive(Default)]
@@ -48,12 +50,12 @@ fn free_port() -> u16 {
 fn certificates(name: &str) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);
-    assert_eq!(make_certificates(&folder).unwrap().len(), 5);
+    assert_eq!(make_certificates(&folder).unwrap().len(), 7);
     assert!(make_certificates(&folder).is_err(), "certificates in use are not replaced");
     folder
 }
 
-/// Publishes frames until told to end, the first transform at x = frame.
+/// Publishes frames until told to end, the first transform at x = frame, scaled by the last turn of the wheel that a display told of.
 fn serve(endpoint: &str, security: Security, end: &AtomicBool) -> Host {
     let mut graph = new_graph();
     let turner = graph.create("Transform").unwrap();
@@ -64,8 +66,13 @@ fn serve(endpoint: &str, security: Security, end: &AtomicBool) -> Host {
     while !end.load(Ordering::Relaxed) {
         frame += 1;
         for input in host.inputs() {
-            let to = graph.find(&input.node).unwrap();
-            graph.set_named(to, &input.field, Vec3::splat(input.number as f32)).unwrap();
+            let Event::Moved(motion) = input.event else { continue };
+            motion.with(|motion| {
+                let Motion::Wheel { notches, .. } = motion else { panic!("{motion:?}") };
+                let scale = graph.get_named::<Vec3>(turner, "scale").unwrap().x;
+                assert_eq!(notches, scale + 1.0, "each is taken once and in order");
+                graph.set_named(turner, "scale", Vec3::splat(notches)).unwrap();
+            });
         }
         graph.set_named(turner, "translation", Vec3::splat(frame as f32)).unwrap();
         host.frame(&graph, false);
@@ -148,20 +155,28 @@ fn only_certificates_of_the_same_authority_are_let_in() {
 }
 
 #[test]
-fn events_of_displays_reach_the_application_in_order() {
-    let endpoint = format!("tcp/127.0.0.1:{}", free_port());
+fn events_of_displays_reach_the_application_once_and_in_order() {
+    let port = free_port();
+    let proxy = Proxy::start(std::net::SocketAddr::from(([127, 0, 0, 1], port))).unwrap();
     let end = AtomicBool::new(false);
     std::thread::scope(|scope| {
-        let host = scope.spawn(|| serve(&endpoint, Security::Loopback, &end));
-        let mut display = join(&endpoint, Security::Loopback, "wall").unwrap();
+        let host = scope.spawn(|| serve(&format!("tcp/127.0.0.1:{port}"), Security::Loopback, &end));
+        let mut display = join(&format!("tcp/127.0.0.1:{}", proxy.port()), Security::Loopback, "wall").unwrap();
         let mut seen = Seen::default();
         assert!(follow(&mut display, &mut seen, |seen| seen.shown.len() > 3).unwrap());
-        for _ in 0..20 {
-            display.tell("turner", "scale", "(1, 1, 1)").unwrap();
+        let frustum = umbriel_scene::Frustum::symmetric(1.0, 1.0, 0.1);
+        let view = &umbriel_scene::View { name: String::new(), view_from_world: glam::Mat4::IDENTITY, frustum, size: [10, 10] };
+        // The line breaks while they are told, for longer than it may be silent.
+        for number in 0..60 {
+            if number == 20 {
+                proxy.cut(LEASE + Duration::from_millis(500));
+            }
+            display.tell(Event::Moved(Motion::Wheel { notches: (number + 2) as f32, view }.into()));
+            display.run(&mut seen, Duration::from_millis(5)).unwrap();
         }
         let mut scale = 0.0;
         let started = Instant::now();
-        while scale < 20.0 && started.elapsed() < Duration::from_secs(10) {
+        while scale < 61.0 && started.elapsed() < Duration::from_secs(10) {
             display.run(&mut seen, Duration::from_millis(10)).unwrap();
             let Some(replica) = display.replica_mut() else { continue };
             let node = replica.graph().find("turner").unwrap();
@@ -169,6 +184,70 @@ fn events_of_displays_reach_the_application_in_order() {
         }
         end.store(true, Ordering::Relaxed);
         host.join().unwrap();
-        assert_eq!(scale, 20.0);
+        assert_eq!(scale, 61.0);
+    });
+}
+
+/// A program of somebody else with a certificate of ours.
+fn raw_session(endpoint: &str, folder: &std::path::Path, role: &str) -> zenoh::Session {
+    let path = |name: String| format!("{:?}", folder.join(name));
+    let rows = [
+        ("mode", "\"peer\"".to_string()),
+        ("scouting/multicast/enabled", "false".into()),
+        ("listen/endpoints", "[]".into()),
+        ("connect/endpoints", format!("[{endpoint:?}]")),
+        (
+            "transport/link/tls",
+            format!(
+                "{{ root_ca_certificate: {}, connect_certificate: {}, connect_private_key: {}, enable_mtls: true, verify_name_on_connect: false }}",
+                path("authority.pem".into()),
+                path(format!("{role}.pem")),
+                path(format!("{role}.key.pem"))
+            ),
+        ),
+    ];
+    let mut config = zenoh::Config::default();
+    rows.iter().for_each(|(key, value)| config.insert_json5(key, value).unwrap());
+    zenoh::open(config).wait().unwrap()
+}
+
+#[test]
+fn a_certificate_is_good_for_one_part_only() {
+    let folder = certificates("roles");
+    // The files of a display under a guest's names, and the other way round.
+    let swapped = folder.join("swapped");
+    std::fs::create_dir_all(&swapped).unwrap();
+    std::fs::copy(folder.join("authority.pem"), swapped.join("authority.pem")).unwrap();
+    for (from, to) in [("display", "guest"), ("guest", "display")] {
+        for kind in ["pem", "key.pem"] {
+            std::fs::copy(folder.join(format!("{from}.{kind}")), swapped.join(format!("{to}.{kind}"))).unwrap();
+        }
+    }
+    let endpoint = format!("tls/127.0.0.1:{}", free_port());
+    let told = join(&endpoint, Security::Mutual(swapped.clone()), "wall").map(drop);
+    assert!(told.as_ref().is_err_and(|e| e.to_string().contains("certificate of `guest`")), "{told:?}");
+    let told = Guest::connect(&endpoint, &Security::Mutual(swapped), "visitor", false, new_graph).map(drop);
+    assert!(told.as_ref().is_err_and(|e| e.to_string().contains("certificate of `display`")), "{told:?}");
+    // Who leaves that check out of the program is not let in all the same.
+    let end = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let host = scope.spawn(|| serve(&endpoint, Security::Mutual(folder.clone()), &end));
+        let mut found = [("display", false), ("guest", false)];
+        for (role, found) in &mut found {
+            let session = raw_session(&endpoint, &folder, role);
+            let started = Instant::now();
+            // The application is seen by both, so that the line stands.
+            while !*found && started.elapsed() < Duration::from_secs(5) {
+                let tokens = session.liveliness().get("umbriel/application").wait().unwrap();
+                *found = tokens.recv_timeout(Duration::from_millis(200)).is_ok_and(|token| token.is_some());
+            }
+            let asked = if *role == "display" { "umbriel/guests/snapshot" } else { "umbriel/snapshot" };
+            let answers = session.get(asked).timeout(Duration::from_millis(700)).wait().unwrap();
+            let answer = answers.recv().ok().map(|answer| answer.into_result().map(|_| ()).map_err(|_| ()));
+            assert_ne!(answer, Some(Ok(())), "{role}");
+        }
+        end.store(true, Ordering::Relaxed);
+        host.join().unwrap();
+        assert_eq!(found, [("display", true), ("guest", true)]);
     });
 }

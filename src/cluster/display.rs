@@ -1,48 +1,145 @@
-//! A display process.
+//! A display process: in a window, or without one.
 
 use super::interrupt::Interrupt;
 use super::join::SILENCE;
-use super::screen::Canvas;
+use super::screen::{Canvas, InWindow, ScreenError, Sight};
 use super::{Failure, security};
 use crate::cli;
+use crate::window::screenshot;
 use std::time::{Duration, Instant};
-use umbriel_displays::cluster::{ClusterError, Follower, FollowerOptions};
+use umbriel_displays::cluster::{ClusterError, Event, Follower, FollowerOptions, Pointing, Screen};
+use umbriel_displays::navigation::Input;
+use umbriel_displays::rig::Aim;
+use umbriel_displays::window::{self, App, Command, Options, Stage};
 use umbriel_fields::{NodeType, TypeRegistry, builtin_types};
+use umbriel_render::RgbaPixels;
 
 /// How long a display that ends with its application waits for the first word of it.
 const PATIENCE_S: u64 = 60;
+/// How long messages are waited for between two looks at mouse and keys.
+const TURN: Duration = Duration::from_millis(4);
 
-/// Follows an application until it ends, or for ever.
+/// Follows an application until it ends, until the window is closed or Ctrl-C, or for ever.
 pub(crate) fn display(args: &cli::Display) -> Result<usize, Failure> {
-    let types: Vec<NodeType> = umbriel_scenegraph::node_types().into_iter().chain(builtin_types()).collect();
-    let mut canvas = Canvas::new(&args.show, args.out.as_deref())?;
-    let options = FollowerOptions {
-        endpoint: args.connect.clone(),
-        security: security(&args.link),
-        lease: args.link.lease(),
-        ends_with_application: args.once,
+    let mut process = Process::start(args)?;
+    let ended = if args.headless {
+        let mut canvas = Canvas::new(&args.show, args.out.as_deref())?;
+        // What is corrupted shows in a frame that comes after it.
+        let patience = Duration::from_millis(if args.corrupt.is_some() { 1 } else { 50 });
+        std::iter::repeat_with(|| process.turn(&mut canvas, patience))
+            .find(|turn| !matches!(turn, Ok(true)))
+            .map(|turn| turn.map(drop))
+    } else {
+        let options = Options { fullscreen: args.fullscreen, ..Options::default() };
+        let mut windowed = Windowed { process, sight: Sight::new(&args.show), ended: false };
+        let ended = window::run(&mut windowed, options);
+        process = windowed.process;
+        Some(ended)
     };
-    let mut follower = Follower::connect(options, &args.show, TypeRegistry::from(types))?;
-    let started = Instant::now();
-    let mut corrupt_after = args.corrupt;
-    // What is corrupted shows in a frame that comes after it.
-    let patience = Duration::from_millis(if args.corrupt.is_some() { 1 } else { 50 });
-    let mut is_told = false;
-    let interrupt = Interrupt::watch()?;
-    while !follower.is_over() && !interrupt.came() {
-        follower.run(&mut canvas, patience).inspect_err(|_| println!("{}", summary(&follower)))?;
-        if !follower.found_application() && started.elapsed() > SILENCE && !std::mem::replace(&mut is_told, true) {
-            tracing::warn!("no application answers at {} yet; waiting for it", args.connect);
+    println!("{}", summary(&process.follower));
+    ended.unwrap_or(Ok(())).map(|()| 0)
+}
+
+/// What both kinds of display do.
+struct Process<'a> {
+    args: &'a cli::Display,
+    follower: Follower,
+    interrupt: Interrupt,
+    started: Instant,
+    /// Silence was told of.
+    is_told: bool,
+    /// The frame after which the replica is still to be corrupted.
+    corrupt_after: Option<u64>,
+}
+
+impl Process<'_> {
+    fn start(args: &cli::Display) -> Result<Process<'_>, Failure> {
+        let types: Vec<NodeType> = umbriel_scenegraph::node_types().into_iter().chain(builtin_types()).collect();
+        let options = FollowerOptions {
+            endpoint: args.connect.clone(),
+            security: security(&args.link),
+            lease: args.link.lease(),
+            ends_with_application: args.once,
+        };
+        Ok(Process {
+            args,
+            follower: Follower::connect(options, &args.show, TypeRegistry::from(types))?,
+            interrupt: Interrupt::watch()?,
+            started: Instant::now(),
+            is_told: false,
+            corrupt_after: args.corrupt,
+        })
+    }
+
+    /// Follows for a while. False where the display ends.
+    fn turn<S: Screen<Error = ScreenError>>(&mut self, screen: &mut S, patience: Duration) -> Result<bool, Failure> {
+        self.follower.run(screen, patience)?;
+        let is_alone = !self.follower.found_application();
+        if is_alone && self.started.elapsed() > SILENCE && !std::mem::replace(&mut self.is_told, true) {
+            tracing::warn!("no application answers at {} yet; waiting for it", self.args.connect);
         }
-        if args.once && !follower.found_application() && started.elapsed() > Duration::from_secs(PATIENCE_S) {
-            return Err(ClusterError::silent(&args.connect, PATIENCE_S, args.link.certificates.is_some()).into());
+        if self.args.once && is_alone && self.started.elapsed() > Duration::from_secs(PATIENCE_S) {
+            let has_certificates = self.args.link.certificates.is_some();
+            return Err(ClusterError::silent(&self.args.connect, PATIENCE_S, has_certificates).into());
         }
-        if corrupt_after.is_some_and(|frame| corrupt(&mut follower, frame)) {
-            corrupt_after = None;
+        if self.corrupt_after.is_some_and(|frame| corrupt(&mut self.follower, frame)) {
+            self.corrupt_after = None;
+        }
+        Ok(!self.follower.is_over() && !self.interrupt.came())
+    }
+}
+
+/// A display whose window takes mouse and keys, which the application hears of.
+struct Windowed<'a> {
+    process: Process<'a>,
+    sight: Sight,
+    ended: bool,
+}
+
+impl App for Windowed<'_> {
+    type Error = Failure;
+
+    fn turn(&mut self, _time_s: f64, stage: &mut Stage<'_>) -> Result<(), Failure> {
+        let goes_on = self.process.turn(&mut InWindow { sight: &mut self.sight, stage }, TURN)?;
+        self.ended |= !goes_on;
+        Ok(())
+    }
+
+    fn is_over(&self) -> bool {
+        self.ended
+    }
+
+    fn waits(&self) -> bool {
+        true
+    }
+
+    fn navigate(&mut self, input: Input<'_>) {
+        self.process.follower.tell(Event::Moved(input.into()));
+    }
+
+    fn point(&mut self, _window: &str, aim: Aim) {
+        let Some(replica) = self.process.follower.replica() else { return };
+        if let Some(pointed) = self.sight.point(replica.graph(), &aim) {
+            let pointing = Pointing::new(&pointed, |node| replica.number(node));
+            self.process.follower.tell(Event::Pointed(pointing));
         }
     }
-    println!("{}", summary(&follower));
-    Ok(0)
+
+    fn command(&mut self, command: Command) {
+        match command {
+            Command::ResetNavigation => self.process.follower.tell(Event::Home),
+            // Which viewpoint a display shows is said at its start, and files are the application's.
+            Command::NextViewpoint | Command::PreviousViewpoint | Command::Reload => {}
+        }
+    }
+
+    fn title(&self) -> String {
+        "Umbriel".into()
+    }
+
+    fn screenshot(&mut self, name: &str, pixels: &RgbaPixels) {
+        screenshot("display", name, pixels);
+    }
 }
 
 fn summary(follower: &Follower) -> String {

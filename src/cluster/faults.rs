@@ -3,10 +3,11 @@
 use super::Failure;
 use super::harness::{Launcher, Process};
 use crate::cli::{self, Fault, FaultKind};
+use clap::ValueEnum;
 use std::collections::VecDeque;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
-use umbriel_displays::cluster::{Host, Proxy};
+use umbriel_displays::cluster::Host;
 
 /// How long a fault lasts, but for kill.
 const LASTS: Duration = Duration::from_secs(1);
@@ -50,17 +51,20 @@ struct Random {
     end_seed: u64,
     ends: Option<Instant>,
     shows: Vec<String>,
+    kinds: Vec<FaultKind>,
     rests_until: Instant,
     told_memory: Option<Instant>,
 }
 
 impl Plan {
-    pub(super) fn new(args: &cli::Cluster, shows: &[String]) -> Plan {
+    /// `can` says what can be broken here.
+    pub(super) fn new(args: &cli::Cluster, shows: &[String], can: impl Fn(FaultKind) -> bool) -> Plan {
         let random = args.random.map(|count| Random {
             next_seed: args.seed,
             end_seed: args.seed.saturating_add(count),
             ends: args.minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(minutes * 60.0)),
             shows: shows.to_vec(),
+            kinds: FaultKind::value_variants().iter().copied().filter(|kind| can(*kind)).collect(),
             rests_until: Instant::now(),
             told_memory: None,
         });
@@ -151,12 +155,9 @@ impl Random {
     fn next(&mut self, frame: u64) -> (u64, Fault) {
         let seed = self.next_seed;
         self.next_seed += 1;
-        let mixed = (seed.wrapping_add(1)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let mixed = mixed ^ (mixed >> 27);
-        let kinds = [FaultKind::Kill, FaultKind::Freeze, FaultKind::Delay, FaultKind::Loss, FaultKind::Partition];
-        let kind = kinds[(mixed % 5) as usize];
-        let display = self.shows[(mixed / 5 % self.shows.len() as u64) as usize].clone();
+        let mut dice = fastrand::Rng::with_seed(seed);
+        let kind = self.kinds[dice.usize(..self.kinds.len())];
+        let display = self.shows[dice.usize(..self.shows.len())].clone();
         (seed, Fault { kind, frame, display })
     }
 }
@@ -189,19 +190,15 @@ fn begin(
 ) -> Result<Open, Failure> {
     let process = processes.iter_mut().find(|process| process.show == fault.display).ok_or("no such display")?;
     let mut heals = Instant::now() + LASTS;
-    match (fault.kind, &process.proxy) {
-        (FaultKind::Kill, _) => {
+    match fault.kind {
+        FaultKind::Kill => {
             process.child.kill()?;
             process.child.wait()?;
-            let port = process.proxy.as_ref().map_or(launcher.address.port(), Proxy::port);
             heals = Instant::now();
-            process.child = launcher.spawn(&process.show, port, false)?;
+            process.child = launcher.spawn(&process.show, &process.wire, false)?;
         }
-        (FaultKind::Freeze, _) => signal(&process.child, "-STOP")?,
-        (FaultKind::Delay, Some(proxy)) => proxy.delay(Duration::from_millis(30)),
-        (FaultKind::Loss, Some(proxy)) => proxy.lose(10),
-        (FaultKind::Partition, Some(proxy)) => proxy.cut(LASTS),
-        (_, None) => return Err("this display has no proxy".into()),
+        FaultKind::Freeze => signal(&process.child, "-STOP")?,
+        kind => process.wire.fail(kind)?,
     }
     tracing::info!("{:?} of `{}` at frame {}", fault.kind, fault.display, fault.frame);
     Ok(Open {
@@ -222,12 +219,13 @@ fn heal(open: &mut Open, processes: &[Process]) -> Result<(), Failure> {
         return Ok(());
     }
     let process = processes.iter().find(|process| process.show == open.fault.display).ok_or("no such display")?;
-    if open.fault.kind == FaultKind::Freeze {
-        signal(&process.child, "-CONT")?;
+    match open.fault.kind {
+        FaultKind::Kill => {}
+        FaultKind::Freeze => signal(&process.child, "-CONT")?,
+        FaultKind::Delay | FaultKind::Loss | FaultKind::Partition => process.wire.heal()?,
     }
-    if let Some(proxy) = &process.proxy {
-        proxy.delay(Duration::ZERO);
-        proxy.lose(0);
+    if open.fault.kind != FaultKind::Kill {
+        open.heals = Instant::now();
     }
     open.is_healed = true;
     Ok(())

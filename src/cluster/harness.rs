@@ -1,17 +1,20 @@
 //! An application and its displays on one machine: faults, and pictures compared with a render in one process.
 
 use super::faults::Plan;
+use super::interrupt::Interrupt;
 use super::maps_once::MapsOnce;
+use super::netns::{Hub, Namespace};
 use super::screen::{channel, file_of};
+use super::wire::Wire;
 use super::{Failure, serve};
 use crate::cli::{self, Fault, FaultKind};
 use crate::headless::DESKTOP_SIZE;
 use crate::png;
 use crate::session::Session;
 use std::collections::BTreeMap;
-use std::net::{SocketAddr, TcpListener};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 use umbriel_displays::WindowSizes;
 use umbriel_displays::cluster::{Host, HostOptions, LEASE, Proxy, Security};
@@ -25,7 +28,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 pub(super) struct Process {
     pub(super) show: String,
     pub(super) child: Child,
-    pub(super) proxy: Option<Proxy>,
+    pub(super) wire: Wire,
 }
 
 /// Runs everything; gives the number of pictures and values that differ.
@@ -35,11 +38,12 @@ pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
     if let Some(fault) = args.fault.iter().find(|fault| !shows.contains(&fault.display)) {
         return Err(format!("there is no display `{}` to break; there are: {}", fault.display, shows.join(", ")).into());
     }
-    let address = free_address()?;
+    let hub = args.netns.then(Hub::make).transpose()?;
+    let address = free_address(hub.as_ref().map_or(Ipv4Addr::LOCALHOST, Hub::address))?;
     let default_ms = if args.breaks() { 200 } else { 60_000 };
     let options = HostOptions {
         listen: format!("tcp/{address}"),
-        security: Security::Loopback,
+        security: if args.netns { Security::Plain } else { Security::Loopback },
         timeout: Duration::from_millis(args.timeout_ms.unwrap_or(default_ms)),
         lease: lease(args),
     };
@@ -47,11 +51,12 @@ pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
     let folder = args.out.clone().unwrap_or_else(|| std::env::temp_dir().join(format!("umbriel-cluster-{}", std::process::id())));
     let launcher = Launcher { args, address, folder: folder.clone() };
     let mut processes: Vec<Process> =
-        shows.iter().enumerate().map(|(place, show)| launcher.start(show, place == 0)).collect::<Result<_, Failure>>()?;
+        (0..).zip(&shows).map(|(place, show)| launcher.start(show, place)).collect::<Result<_, Failure>>()?;
     let count = processes.len();
     let mut once = MapsOnce::default();
     serve::begin(&mut session, &mut once, &mut host, count, &mut || all_run(&mut processes))?;
-    let mut plan = Plan::new(args, &shows);
+    let mut plan = Plan::new(args, &shows, |kind| processes.iter().all(|process| process.wire.can(kind)));
+    let interrupt = Interrupt::watch()?;
     let started = Instant::now();
     let mut frame = 1;
     let mut is_last = false;
@@ -59,7 +64,7 @@ pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
         host.wait_until(session.graph(), started + Duration::from_secs_f64(frame as f64 / args.fps));
         frame += 1;
         // Frames after the last one that was asked for give everybody the time to come back.
-        is_last = frame >= args.frames && plan.is_over();
+        is_last = frame >= args.frames() && plan.is_over() || interrupt.came() || args.windows && all_closed(&mut processes)?;
         // Nothing is broken before everybody is in the lock for the first time.
         if host.live().len() == count {
             plan.begin(frame, &host, &mut processes, &launcher)?;
@@ -96,26 +101,35 @@ fn all_run(processes: &mut [Process]) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Has the user closed every window?
+fn all_closed(processes: &mut [Process]) -> std::io::Result<bool> {
+    let ended = processes.iter_mut().map(|process| Ok(process.child.try_wait()?.is_some()));
+    ended.collect::<std::io::Result<Vec<bool>>>().map(|ended| ended.iter().all(|ended| *ended))
+}
+
 /// Starts display processes.
 pub(super) struct Launcher<'a> {
     args: &'a cli::Cluster,
-    pub(super) address: SocketAddr,
+    address: SocketAddr,
     folder: PathBuf,
 }
 
 impl Launcher<'_> {
-    fn start(&self, show: &str, is_first: bool) -> Result<Process, Failure> {
+    fn start(&self, show: &str, place: u8) -> Result<Process, Failure> {
         let is_broken = |fault: &Fault| fault.display == show && !matches!(fault.kind, FaultKind::Kill | FaultKind::Freeze);
         let needs_proxy = self.args.random.is_some() || self.args.fault.iter().any(is_broken);
-        let proxy = needs_proxy.then(|| Proxy::start(self.address)).transpose()?;
-        let port = proxy.as_ref().map_or(self.address.port(), Proxy::port);
-        Ok(Process { show: show.into(), child: self.spawn(show, port, is_first)?, proxy })
+        let wire = match (self.args.netns, needs_proxy) {
+            (true, _) => Wire::Namespace(Namespace::make(place)?, self.address),
+            (false, true) => Wire::Proxy(Proxy::start(self.address)?),
+            (false, false) => Wire::Direct(self.address),
+        };
+        Ok(Process { show: show.into(), child: self.spawn(show, &wire, place == 0)?, wire })
     }
 
-    pub(super) fn spawn(&self, show: &str, port: u16, is_first: bool) -> Result<Child, Failure> {
-        let mut command = Command::new(std::env::current_exe()?);
-        command.args(["display", "--headless", "--once", "--show", show]);
-        command.args(["--connect", &format!("tcp/127.0.0.1:{port}")]);
+    pub(super) fn spawn(&self, show: &str, wire: &Wire, is_first: bool) -> Result<Child, Failure> {
+        let mut command = wire.command()?;
+        command.args(["--once", "--show", show, "--connect", &wire.endpoint()]);
+        command.args((!self.args.windows).then_some("--headless"));
         command.args(["--lease-ms", &lease(self.args).as_millis().to_string()]);
         if self.args.check {
             command.arg("--out").arg(self.folder.join(file_name(show)));
@@ -128,8 +142,8 @@ impl Launcher<'_> {
 }
 
 /// An address of this machine on which nobody listens.
-fn free_address() -> Result<SocketAddr, Failure> {
-    Ok(TcpListener::bind("127.0.0.1:0")?.local_addr()?)
+fn free_address(of: Ipv4Addr) -> Result<SocketAddr, Failure> {
+    Ok(TcpListener::bind((of, 0))?.local_addr()?)
 }
 
 /// The displays of a world, or their channels.

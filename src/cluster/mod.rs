@@ -6,9 +6,11 @@ mod harness;
 mod interrupt;
 mod join;
 mod maps_once;
+mod netns;
 mod refusals;
 mod screen;
 mod serve;
+mod wire;
 
 pub(crate) use display::display;
 pub(crate) use harness::run;
@@ -33,5 +35,7 @@ fn security(link: &cli::Link) -> Security {
 pub(crate) fn certificates(args: &cli::Certs) -> Result<String, Failure> {
     let files = make_certificates(&args.folder)?;
     let names: Vec<String> = files.iter().map(|file| format!("{}\n", file.display())).collect();
-    Ok(names.concat() + "Give authority.pem, display.pem and display.key.pem to the machines of the displays; keep the rest.\n")
+    let whose = "Give authority.pem, display.pem and display.key.pem to the machines of the displays; authority.pem, guest.pem and \
+        guest.key.pem to those of applications that join; keep the rest.\n";
+    Ok(names.concat() + whose)
 }

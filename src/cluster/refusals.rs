@@ -1,6 +1,8 @@
 //! Connections that the network library refuses, told to the operator in words.
 
 use std::fmt::Debug;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 use tracing::field::{Field, Visit};
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::Layer;
@@ -9,25 +11,57 @@ use tracing_subscriber::layer::Context;
 /// What zenoh appends to whatever goes wrong while a connection is accepted.
 const HINT: &str = ". Hint: increase the system open file limit.";
 
-/// Hears of refused connections and logs them anew.
-pub(crate) struct Refusals;
+/// How long the same refusal is not told again.
+const QUIET: Duration = Duration::from_secs(10);
+
+/// Hears of refused connections and requests, and logs them anew.
+#[derive(Default)]
+pub(crate) struct Refusals {
+    told: Mutex<Option<(String, Instant)>>,
+}
 
 impl Refusals {
-    /// Where the network library reports them.
-    pub(crate) const TARGET: &str = "zenoh_link_tls";
+    /// Where the network library reports them, and how loudly.
+    pub(crate) const TARGETS: [(&str, Level); 2] =
+        [("zenoh_link_tls", Level::WARN), ("zenoh::net::routing::interceptor::access_control", Level::TRACE)];
+
+    fn tell(&self, text: String) {
+        let Ok(mut told) = self.told.lock() else { return };
+        if !told.as_ref().is_some_and(|(last, when)| *last == text && when.elapsed() < QUIET) {
+            tracing::warn!("{text}");
+            *told = Some((text, Instant::now()));
+        }
+    }
 }
 
 impl<S: Subscriber> Layer<S> for Refusals {
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
-        let is_theirs = event.metadata().target().starts_with(Refusals::TARGET) && *event.metadata().level() == Level::WARN;
+        let is_theirs = Refusals::TARGETS.iter().any(|(target, _)| event.metadata().target().starts_with(target));
         let mut text = Text(String::new());
         if is_theirs {
             event.record(&mut text);
         }
         if let Some(reason) = text.0.strip_suffix(HINT) {
-            tracing::warn!("a connection was refused: {}", in_words(reason));
+            self.tell(format!("a connection was refused: {}", in_words(reason)));
+        } else if let Some(text) = denied(&text.0) {
+            self.tell(text);
         }
     }
+}
+
+/// What access control says of messages that it does not let in.
+fn denied(text: &str) -> Option<String> {
+    if text.contains("did not match any configured ACL subject") {
+        return Some("a peer may do nothing here: its certificate is neither of a `display` nor of a `guest`".into());
+    }
+    let (who, what) = text.split_once(" is unauthorized to ")?;
+    let role = ["display", "guest"].into_iter().find(|role| who.split('+').any(|part| part == *role)).unwrap_or("?");
+    let (kind, subject) = what.split_once(" (ingress) on ")?;
+    let wants = if subject.starts_with("umbriel/guest") { "work on the world" } else { "do what is not its part" };
+    Some(format!(
+        "a peer with the certificate of a `{role}` wants to {wants}, and is refused ({}, {subject})",
+        kind.to_lowercase()
+    ))
 }
 
 struct Text(String);
@@ -55,4 +89,32 @@ fn in_words(reason: &str) -> String {
         ("eof", "it hung up during the handshake"),
     ];
     rows.iter().find(|(known, _)| reason.contains(known)).map_or_else(|| reason.to_string(), |(_, words)| words.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_access_control_says() {
+        let rows = [
+            (
+                "a1b2 on lo+display+tls+a1b2 is unauthorized to Query (ingress) on umbriel/guests/snapshot",
+                Some(
+                    "the certificate of a `display` wants to work on the world, and is refused (query, umbriel/guests/snapshot)",
+                ),
+            ),
+            (
+                "a1b2 on lo+guest+tls+a1b2 is unauthorized to Put (ingress) on umbriel/ready",
+                Some("the certificate of a `guest` wants to do what is not its part, and is refused (put, umbriel/ready)"),
+            ),
+            ("a1b2 did not match any configured ACL subject. Default permission `Deny`", Some("neither of a `display` nor")),
+            ("a1b2 on lo+guest is authorized to Put (ingress) on umbriel/ready", None),
+        ];
+        for (text, expected) in rows {
+            let found = denied(text);
+            assert_eq!(found.is_some(), expected.is_some(), "{text}");
+            assert!(found.unwrap_or_default().contains(expected.unwrap_or_default()), "{text}");
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! Draws one display, or one channel of it, out of a replica.
+//! Draws one display, or one channel of it, out of a replica: to files or in a window.
 
 use super::Failure;
 use crate::headless::{DESKTOP_SIZE, describe};
@@ -7,7 +7,8 @@ use crate::session::bounds;
 use std::path::{Path, PathBuf};
 use umbriel_displays::WindowSizes;
 use umbriel_displays::cluster::{ClusterError, Screen};
-use umbriel_displays::rig::{DESKTOP, Rig, Wanted};
+use umbriel_displays::rig::{Aim, DESKTOP, Pointed, Pointers, Rig, Wanted};
+use umbriel_displays::window::Stage;
 use umbriel_fields::Graph;
 use umbriel_render::{Gpu, Renderer, RgbaPixels};
 use umbriel_scene::{Aabb, Picture, Scene};
@@ -19,9 +20,9 @@ pub(crate) enum ScreenError {
     /// Of the network.
     #[error(transparent)]
     Cluster(#[from] ClusterError),
-    /// Of the rig.
+    /// Of the rig, or of a window.
     #[error(transparent)]
-    Rig(#[from] umbriel_displays::Error),
+    Display(#[from] umbriel_displays::Error),
     /// A channel that the display does not have.
     #[error("display `{display}` has {count} channels: there is no `{display}/{channel}`")]
     Channel {
@@ -54,58 +55,42 @@ pub(super) fn channel(picture: &Picture, channel: usize) -> Option<Picture> {
     Some(Picture { name: format!("{}/{channel}", picture.name), kind: picture.kind, ..Picture::mono(view) })
 }
 
-/// A display without a window.
-pub(super) struct Canvas {
+/// One display, or one channel of it, in a replica.
+pub(super) struct Sight {
     show: String,
-    out: Option<PathBuf>,
-    device: String,
-    renderer: Renderer,
     extractor: Extractor,
     scene: Scene,
+    pointers: Pointers,
     rig: Rig,
     /// Of all displays.
     whole: Rig,
-    drawn: Vec<RgbaPixels>,
 }
 
-impl Canvas {
-    pub(super) fn new(show: &str, out: Option<&Path>) -> Result<Canvas, Failure> {
-        let gpu = Gpu::new(None)?;
-        Ok(Canvas {
+/// What a display shows, and what maps are fitted to: what all displays of the installation show.
+pub(super) struct Seen {
+    pub(super) pictures: Vec<Picture>,
+    pub(super) all: Vec<Picture>,
+}
+
+impl Sight {
+    pub(super) fn new(show: &str) -> Sight {
+        Sight {
             show: show.into(),
-            out: out.map(Path::to_path_buf),
-            device: describe(&gpu),
-            renderer: Renderer::new(&gpu)?,
             extractor: Extractor::new(),
             scene: Scene::default(),
+            pointers: Pointers::default(),
             rig: Rig::new(),
             whole: Rig::new(),
-            drawn: Vec::new(),
-        })
+        }
     }
-}
 
-impl Canvas {
-    /// What all displays show, here and elsewhere.
-    fn installation(&mut self, graph: &Graph, bounds: &Aabb, shown: &[Picture]) -> Result<Vec<Picture>, ScreenError> {
-        let wanted = Wanted { view: None, size: DESKTOP_SIZE, windows: &WindowSizes::new() };
-        let mut all = self.whole.pictures(graph, self.extractor.viewpoints(), bounds, &wanted)?.pictures;
-        // A viewpoint is shown by this process alone.
-        all.retain(|picture| picture.name != DESKTOP);
-        let is_elsewhere = |one: &&Picture| !all.iter().any(|other| other.name == one.name);
-        let alone: Vec<Picture> = shown.iter().filter(is_elsewhere).cloned().collect();
-        all.extend(alone);
-        Ok(all)
-    }
-}
-
-impl Screen for Canvas {
-    type Error = ScreenError;
-
-    fn draw(&mut self, graph: &Graph, _frame: u64, is_new: bool) -> Result<(), ScreenError> {
+    /// Brings the scene up to date with a graph, which is another one where `is_new`. `windows` are sizes of windows that are open, by
+    /// the names of their pictures.
+    pub(super) fn look(&mut self, graph: &Graph, is_new: bool, windows: &WindowSizes) -> Result<Seen, ScreenError> {
         if is_new {
             self.extractor = Extractor::new().with_ready_casters();
             self.scene = Scene::default();
+            self.pointers = Pointers::default();
             self.rig.refit();
             self.whole.refit();
         }
@@ -113,22 +98,92 @@ impl Screen for Canvas {
         for problem in self.extractor.problems() {
             tracing::error!("{problem}");
         }
-        let show = self.show.clone();
-        let (name, wanted_channel) = channel_of(&show);
         let bounds = bounds(&self.scene).transformed(&self.extractor.world_from_room());
-        let wanted = Wanted { view: Some(name), size: DESKTOP_SIZE, windows: &WindowSizes::new() };
-        let found = self.rig.pictures(graph, self.extractor.viewpoints(), &bounds, &wanted)?;
+        let mut pictures = self.shown(graph, &bounds, windows)?;
+        if let (_, Some(place)) = channel_of(&self.show)
+            && let [whole] = &pictures[..]
+        {
+            // What one window shows is a part of the picture that the rig makes.
+            let part = channel_in(whole, place)?;
+            pictures = match windows.get(&part.name) {
+                None => vec![part],
+                Some(window) => {
+                    let scaled = [0, 1].map(|i| window[i] * (whole.size[i] / part.size[i].max(1)));
+                    let windows = WindowSizes::from([(whole.name.clone(), scaled)]);
+                    let whole = self.shown(graph, &bounds, &windows)?;
+                    vec![channel_in(&whole[0], place)?]
+                }
+            };
+        }
+        let all = self.installation(graph, &bounds, &pictures)?;
+        Ok(Seen { pictures, all })
+    }
+
+    /// What the mouse points at here, if the world wants to know.
+    pub(super) fn point(&mut self, graph: &Graph, aim: &Aim) -> Option<Pointed> {
+        let node_of = |drawable| self.extractor.node_of_drawable(drawable);
+        let is_wanted = self.pointers.want(graph, &self.show);
+        is_wanted.then(|| Pointed::find(aim, &self.scene, &self.extractor.world_from_room(), node_of))
+    }
+
+    /// The pictures of the display, whole.
+    fn shown(&mut self, graph: &Graph, bounds: &Aabb, windows: &WindowSizes) -> Result<Vec<Picture>, ScreenError> {
+        let (name, _) = channel_of(&self.show);
+        let wanted = Wanted { view: Some(name), size: DESKTOP_SIZE, windows };
+        let found = self.rig.pictures(graph, self.extractor.viewpoints(), bounds, &wanted)?;
         for problem in &found.problems {
             tracing::error!("{problem}");
         }
-        let mut pictures = found.pictures;
-        let all = self.installation(graph, &bounds, &pictures)?;
-        if let Some(wanted) = wanted_channel {
-            let count = pictures.iter().map(|picture| picture.views.len()).sum();
-            let one = pictures.iter().find_map(|picture| channel(picture, wanted));
-            pictures = vec![one.ok_or_else(|| ScreenError::Channel { display: name.into(), channel: wanted, count })?];
+        Ok(found.pictures)
+    }
+
+    /// What all displays show, here and elsewhere.
+    fn installation(&mut self, graph: &Graph, bounds: &Aabb, shown: &[Picture]) -> Result<Vec<Picture>, ScreenError> {
+        let wanted = Wanted { view: None, size: DESKTOP_SIZE, windows: &WindowSizes::new() };
+        let mut all = self.whole.pictures(graph, self.extractor.viewpoints(), bounds, &wanted)?.pictures;
+        // A viewpoint is shown by this process alone.
+        all.retain(|picture| picture.name != DESKTOP);
+        let (name, _) = channel_of(&self.show);
+        if !all.iter().any(|picture| picture.name == name) {
+            all.extend_from_slice(shown);
         }
-        self.renderer.render_part(&self.scene, &pictures, &all)?;
+        Ok(all)
+    }
+}
+
+fn channel_in(picture: &Picture, place: usize) -> Result<Picture, ScreenError> {
+    let missing = || ScreenError::Channel { display: picture.name.clone(), channel: place, count: picture.views.len() };
+    channel(picture, place).ok_or_else(missing)
+}
+
+/// A display without a window.
+pub(super) struct Canvas {
+    sight: Sight,
+    out: Option<PathBuf>,
+    device: String,
+    renderer: Renderer,
+    drawn: Vec<RgbaPixels>,
+}
+
+impl Canvas {
+    pub(super) fn new(show: &str, out: Option<&Path>) -> Result<Canvas, Failure> {
+        let gpu = Gpu::new(None)?;
+        Ok(Canvas {
+            sight: Sight::new(show),
+            out: out.map(Path::to_path_buf),
+            device: describe(&gpu),
+            renderer: Renderer::new(&gpu)?,
+            drawn: Vec::new(),
+        })
+    }
+}
+
+impl Screen for Canvas {
+    type Error = ScreenError;
+
+    fn draw(&mut self, graph: &Graph, _frame: u64, is_new: bool) -> Result<(), ScreenError> {
+        let seen = self.sight.look(graph, is_new, &WindowSizes::new())?;
+        self.renderer.render_part(&self.sight.scene, &seen.pictures, &seen.all)?;
         for problem in self.renderer.problems() {
             tracing::error!("{problem}");
         }
@@ -142,6 +197,26 @@ impl Screen for Canvas {
             png::write(&file_of(out, frame), &png::row(&self.drawn), &self.device)?;
         }
         Ok(())
+    }
+}
+
+/// A display in a window, for a turn of the window's loop.
+pub(super) struct InWindow<'a, 's> {
+    pub(super) sight: &'a mut Sight,
+    pub(super) stage: &'a mut Stage<'s>,
+}
+
+impl Screen for InWindow<'_, '_> {
+    type Error = ScreenError;
+
+    fn draw(&mut self, graph: &Graph, _frame: u64, is_new: bool) -> Result<(), ScreenError> {
+        let seen = self.sight.look(graph, is_new, &self.stage.sizes())?;
+        self.stage.draw(&self.sight.scene, seen.pictures, Some(&seen.all))?;
+        Ok(self.stage.wait()?)
+    }
+
+    fn show(&mut self, _frame: u64) -> Result<(), ScreenError> {
+        Ok(self.stage.show()?)
     }
 }
 

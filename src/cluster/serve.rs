@@ -6,8 +6,7 @@ use super::{Failure, security};
 use crate::cli;
 use crate::session::Session;
 use std::time::{Duration, Instant};
-use umbriel_displays::cluster::{Desk, Host, HostOptions, Input};
-use umbriel_fields::{Graph, Value};
+use umbriel_displays::cluster::{Desk, Event, Host, HostOptions};
 
 /// Serves until the last frame, or for ever.
 pub(crate) fn serve(args: &cli::Serve) -> Result<usize, Failure> {
@@ -69,9 +68,11 @@ fn step_with(
     let mut told = 0;
     once.end(session.graph_mut());
     for input in host.inputs() {
-        if let Err(reason) = apply(session.graph_mut(), &input) {
-            tracing::error!("display `{}`: {reason}", input.display);
-            told += 1;
+        tracing::debug!("display `{}`: {:?}", input.display, input.event);
+        match input.event {
+            Event::Moved(motion) => motion.with(|input| session.navigate(input)),
+            Event::Home => session.reset_navigation(),
+            Event::Pointed(pointing) => session.pointed(&input.display, &pointing.pointed()),
         }
     }
     if let Some(desk) = &mut desk {
@@ -109,54 +110,4 @@ pub(super) fn summary(host: &Host) -> String {
         report.agreed,
         report.disagreed
     )
-}
-
-/// Writes what a display told into the world.
-fn apply(graph: &mut Graph, input: &Input) -> Result<(), String> {
-    let node = graph.find(&input.node).ok_or_else(|| format!("there is no node `{}`", input.node))?;
-    let value = value(&input.value).ok_or_else(|| format!("`{}` is no value", input.value))?;
-    graph.set_named(node, &input.field, value).map_err(|error| error.to_string())
-}
-
-/// `true`, `0.5`, `(1.0, 0.0, 0.0)`, `"text"`.
-fn value(text: &str) -> Option<Value> {
-    let text = text.trim();
-    if let Ok(flag) = text.parse::<bool>() {
-        return Some(flag.into());
-    }
-    if let Ok(number) = text.parse::<f64>() {
-        return Some(number.into());
-    }
-    if let Some(quoted) = text.strip_prefix('"').and_then(|text| text.strip_suffix('"')) {
-        return Some(quoted.into());
-    }
-    let inner = text.strip_prefix('(')?.strip_suffix(')')?;
-    let numbers: Vec<f32> = inner.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;
-    match numbers[..] {
-        [x, y] => Some(glam::Vec2::new(x, y).into()),
-        [x, y, z] => Some(glam::Vec3::new(x, y, z).into()),
-        [x, y, z, w] => Some(glam::Vec4::new(x, y, z, w).into()),
-        _ => None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_of_inputs() {
-        let rows: [(&str, Option<Value>); 7] = [
-            ("true", Some(true.into())),
-            (" 0.5 ", Some(0.5f64.into())),
-            ("\"a b\"", Some("a b".into())),
-            ("(1, 2, 3)", Some(glam::Vec3::new(1.0, 2.0, 3.0).into())),
-            ("(1)", None),
-            ("(1, x)", None),
-            ("system()", None),
-        ];
-        for (text, expected) in rows {
-            assert_eq!(value(text), expected, "{text}");
-        }
-    }
 }

@@ -1,5 +1,7 @@
 //! What several tests need.
 
+#[cfg(feature = "cluster")]
+pub(crate) mod process;
 #[cfg(target_os = "linux")]
 pub(crate) mod screen;
 

@@ -73,13 +73,27 @@ impl Screen {
         RgbImage::from_raw(width.into(), height.into(), rgb)
     }
 
+    /// Presses and lets go a key that has this symbol of X (`XK_Escape` is 0xff1b), at a window.
+    pub(crate) fn press(&self, window: Window, symbol: u32) {
+        let setup = self.connection.setup();
+        let (first, count) = (setup.min_keycode, setup.max_keycode - setup.min_keycode + 1);
+        let keys = self.connection.get_keyboard_mapping(first, count).expect("sent").reply().expect("the keyboard is known");
+        let mut rows = keys.keysyms.chunks_exact(keys.keysyms_per_keycode.into());
+        let place = rows.position(|row| row.contains(&symbol)).expect("the keyboard has the key");
+        self.connection.set_input_focus(xproto::InputFocus::PARENT, window, x11rb::CURRENT_TIME).expect("sent");
+        self.fake(xproto::KEY_PRESS_EVENT, first + place as u8, (0, 0));
+        self.fake(xproto::KEY_RELEASE_EVENT, first + place as u8, (0, 0));
+    }
+
+    fn fake(&self, kind: u8, detail: u8, (x, y): (i16, i16)) {
+        self.connection.xtest_fake_input(kind, detail, 0, self.root, x, y, 0).expect("fake input is sent");
+        self.connection.flush().expect("fake input is sent");
+        std::thread::sleep(Duration::from_millis(30));
+    }
+
     /// Presses the left button at one place of the screen, moves to another in steps, and lets go.
     pub(crate) fn drag(&self, from: (i16, i16), to: (i16, i16)) {
-        let fake = |kind: u8, detail: u8, (x, y): (i16, i16)| {
-            self.connection.xtest_fake_input(kind, detail, 0, self.root, x, y, 0).expect("fake input is sent");
-            self.connection.flush().expect("fake input is sent");
-            std::thread::sleep(Duration::from_millis(30));
-        };
+        let fake = |kind: u8, detail: u8, at: (i16, i16)| self.fake(kind, detail, at);
         fake(xproto::MOTION_NOTIFY_EVENT, 0, from);
         fake(xproto::BUTTON_PRESS_EVENT, 1, from);
         for step in 1..=10 {

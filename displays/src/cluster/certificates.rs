@@ -6,7 +6,7 @@ use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, KeyUsagePurpose, date_time_ymd,
 };
 
-use super::transport::ClusterError;
+use super::transport::{ClusterError, End};
 
 fn failed(error: impl std::fmt::Display) -> ClusterError {
     ClusterError::Make(error.to_string())
@@ -20,7 +20,8 @@ fn params(name: &str) -> Result<CertificateParams, ClusterError> {
     Ok(params)
 }
 
-/// Makes an authority, and certificates of it for the application and for displays, each with its key. Gives the files that were written.
+/// Makes an authority, and certificates of it for the application, for displays and for applications that join, each with its key. Gives the
+/// files that were written.
 /// The key of the authority is not kept: to add a machine later, copy the display's files, or make all anew.
 ///
 /// # Errors
@@ -33,9 +34,10 @@ pub fn make(folder: &Path) -> Result<Vec<PathBuf>, ClusterError> {
     let certificate = authority.self_signed(&key).map_err(failed)?;
     let issuer = Issuer::new(authority, key);
     let mut files = vec![("authority.pem".to_string(), certificate.pem())];
-    for (name, purpose) in
-        [("application", ExtendedKeyUsagePurpose::ServerAuth), ("display", ExtendedKeyUsagePurpose::ClientAuth)]
-    {
+    for role in [End::Application, End::Display, End::Guest] {
+        let name = role.name();
+        let is_server = role == End::Application;
+        let purpose = if is_server { ExtendedKeyUsagePurpose::ServerAuth } else { ExtendedKeyUsagePurpose::ClientAuth };
         let mut end = params(name)?;
         end.use_authority_key_identifier_extension = true;
         end.key_usages = vec![KeyUsagePurpose::DigitalSignature];

@@ -9,12 +9,14 @@ use zenoh::Wait;
 use zenoh::pubsub::Publisher as ZenohPublisher;
 use zenoh::qos::{CongestionControl, Priority};
 
+use super::event::Event;
 use super::line::{Answer, Line};
 use super::lock::{DisplayAction, DisplayEvent, DisplayLock};
 use super::message::{
-    DISPLAY, FRAME, INPUT, Input, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, bytes_of, message_of, unstamped,
+    DISPLAY, FRAME, INPUT, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, Told, bytes_of, message_of, unstamped,
 };
-use super::transport::{ClusterError, Security, network};
+use super::ordered::Outbox;
+use super::transport::{ClusterError, End, Security, network};
 
 /// Draws and shows what a follower follows.
 pub trait Screen {
@@ -73,7 +75,8 @@ pub struct Follower {
     types: TypeRegistry,
     ready: ZenohPublisher<'static>,
     input: ZenohPublisher<'static>,
-    inputs: u64,
+    /// What was told to a run of the application.
+    told: (u64, Outbox<Vec<u8>>),
     lock: DisplayLock,
     replica: Option<Replica>,
     /// One that differs from the application, until it is known where.
@@ -103,12 +106,22 @@ const NAME_IS_FREE_AFTER: Duration = Duration::from_secs(4);
 /// A link that broke looks like an application that ended; after so long it did.
 const APPLICATION_ENDED_AFTER: Duration = Duration::from_secs(5);
 
+/// What the application did not confirm within this time is told again.
+const TOLD_AGAIN_AFTER: Duration = Duration::from_millis(200);
+
+fn put(publisher: &ZenohPublisher<'static>, bytes: &[u8]) {
+    if let Err(error) = publisher.put(bytes).wait() {
+        tracing::debug!("cannot tell: {error}");
+    }
+}
+
 impl Follower {
     /// Joins the application, now or as soon as it is there. `name` is that of the display; `types` are those that can
     /// be drawn.
     pub fn connect(options: FollowerOptions, name: &str, types: impl Into<TypeRegistry>) -> Result<Follower, ClusterError> {
         let subjects = [(FRAME, Arrived::Frame as fn(Vec<u8>) -> Arrived), (RELEASE, Arrived::Release)];
-        let mut line = Line::open(&options.endpoint, &options.security, options.lease, subjects, Arrived::Application)?;
+        let mut line =
+            Line::open(End::Display, &options.endpoint, &options.security, options.lease, subjects, Arrived::Application)?;
         let declare = |key: &'static str| {
             let publisher = line.session.declare_publisher(key).congestion_control(CongestionControl::Drop);
             publisher.priority(Priority::RealTime).express(true).wait().map_err(network)
@@ -121,7 +134,7 @@ impl Follower {
             types: types.into(),
             ready,
             input,
-            inputs: 0,
+            told: (0, Outbox::default()),
             lock: DisplayLock::new(),
             replica: None,
             doubted: None,
@@ -158,6 +171,11 @@ impl Follower {
         self.lock.epoch() > 0
     }
 
+    /// The world here, once it came.
+    pub fn replica(&self) -> Option<&Replica> {
+        self.replica.as_ref()
+    }
+
     /// The replica, for tests that corrupt it.
     pub fn replica_mut(&mut self) -> Option<&mut Replica> {
         self.replica.as_mut()
@@ -168,12 +186,19 @@ impl Follower {
         self.drawn_frame
     }
 
-    /// Tells the application of something that happened here.
-    pub fn tell(&mut self, node: &str, field: &str, value: &str) -> Result<(), ClusterError> {
-        self.inputs += 1;
-        let [node, field, value] = [node, field, value].map(String::from);
-        let input = Input { display: self.name.clone(), number: self.inputs, node, field, value };
-        self.input.put(bytes_of(&input)).wait().map_err(network)
+    /// Tells the application of something that happened here. It arrives once and in order, whatever the line does; with an application
+    /// that ends, it is gone.
+    pub fn tell(&mut self, event: Event) {
+        let (display, epoch) = (self.line.id, self.lock.epoch());
+        if self.told.0 != epoch {
+            self.told = (epoch, Outbox::default());
+        }
+        if epoch == 0 || !self.told.1.has_room() {
+            return tracing::debug!("nobody hears what happens at `{}`", self.name);
+        }
+        let bytes = bytes_of(&Told { display, epoch, number: self.told.1.next(), event });
+        put(&self.input, &bytes);
+        self.told.1.sent(bytes);
     }
 
     /// Handles what comes within some time.
@@ -188,6 +213,9 @@ impl Follower {
                 }
             }
             self.step(DisplayEvent::Tick, screen)?;
+            if self.told.0 == self.lock.epoch() {
+                self.told.1.overdue(TOLD_AGAIN_AFTER).for_each(|bytes| put(&self.input, bytes));
+            }
             let is_alone = self.alone_since.is_some_and(|since| since.elapsed() > APPLICATION_ENDED_AFTER);
             self.is_over |= self.ends_with_application && is_alone;
             if left.is_zero() || self.is_over {
@@ -219,6 +247,11 @@ impl Follower {
             Arrived::Release(bytes) => match message_of::<Release>(&bytes) {
                 Ok(release) => {
                     let is_mine = release.may_show.contains(&self.line.id);
+                    if let Some((_, number)) = release.heard.iter().find(|(display, _)| *display == self.line.id)
+                        && release.epoch == self.told.0
+                    {
+                        self.told.1.confirm(*number);
+                    }
                     self.unpark(screen)?;
                     self.step(DisplayEvent::Release { epoch: release.epoch, frame: release.frame, is_mine }, screen)?;
                     self.is_over |= self.ends_with_application && release.is_last && release.epoch == self.lock.epoch();
@@ -316,9 +349,7 @@ impl Follower {
                         let name = self.name.clone();
                         let (epoch, took_us) = (self.lock.epoch(), self.took.as_micros() as u64);
                         let ready = Ready { display: self.line.id, name, epoch, frame, took_us, hash };
-                        if let Err(error) = self.ready.put(bytes_of(&ready)).wait() {
-                            tracing::debug!("cannot say ready: {error}");
-                        }
+                        put(&self.ready, &bytes_of(&ready));
                     }
                     DisplayAction::Show(frame) => {
                         screen.show(frame)?;

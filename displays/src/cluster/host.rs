@@ -14,11 +14,13 @@ use zenoh::query::{Query, Queryable};
 use zenoh::sample::SampleKind;
 use zenoh::{Session, Wait};
 
+use super::event::{Event, Input};
 use super::lock::{ApplicationAction, ApplicationEvent, ApplicationLock, DisplayId};
 use super::message::{
-    APPLICATION, BULK, DISPLAY, FRAME, INPUT, Input, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, bytes_of,
+    APPLICATION, BULK, DISPLAY, FRAME, INPUT, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, Told, bytes_of,
     message_of, stamped,
 };
+use super::ordered::Inbox;
 use super::transport::{ClusterError, End, Security, network, open};
 
 /// How an application is reached.
@@ -96,7 +98,8 @@ pub struct Host {
     snapshot: Option<(u64, Arc<[u8]>)>,
     hashes: HashMap<u64, u64>,
     inputs: Vec<Input>,
-    last_input: HashMap<String, u64>,
+    /// By number of the display.
+    inboxes: BTreeMap<u64, Inbox<Event>>,
     is_last: bool,
     report: HostReport,
     _held: (Vec<Subscriber<()>>, Vec<Queryable<()>>, LivelinessToken),
@@ -168,7 +171,7 @@ impl Host {
             snapshot: None,
             hashes: HashMap::new(),
             inputs: Vec::new(),
-            last_input: HashMap::new(),
+            inboxes: BTreeMap::new(),
             is_last: false,
             report: HostReport::default(),
             _held: (subscribers, queryables, token),
@@ -269,18 +272,9 @@ impl Host {
                 Ok(_) => {}
                 Err(error) => tracing::warn!("from a display: {error}"),
             },
-            Arrived::Input(bytes) => match message_of::<Input>(&bytes) {
-                Ok(input) => {
-                    let last = self.last_input.entry(input.display.clone()).or_insert(0);
-                    // A display that came back counts from one again.
-                    if input.number == 1 || input.number > *last {
-                        if input.number > *last + 1 {
-                            tracing::warn!("{}: {} inputs are missing", input.display, input.number - *last - 1);
-                        }
-                        *last = input.number;
-                        self.inputs.push(input);
-                    }
-                }
+            Arrived::Input(bytes) => match message_of::<Told>(&bytes) {
+                Ok(told) if told.epoch == self.epoch => self.is_told(told),
+                Ok(_) => {}
                 Err(error) => tracing::warn!("from a display: {error}"),
             },
             Arrived::Gone(number) => {
@@ -297,6 +291,14 @@ impl Host {
                 let _ = self.replies.send((query, answer));
             }
         }
+    }
+
+    fn is_told(&mut self, told: Told) {
+        // Who is not known by name says it again once it has joined.
+        let Some(name) = self.names.get(&told.display) else { return };
+        let inbox = self.inboxes.entry(told.display).or_default();
+        let inputs = inbox.arrived(told.number, told.event).into_iter();
+        self.inputs.extend(inputs.map(|event| Input { display: name.clone(), event }));
     }
 
     /// Another display of this name.
@@ -369,7 +371,8 @@ impl Host {
             match action {
                 ApplicationAction::Release(frame, may_show) => {
                     let may_show = may_show.into_iter().map(|id| id.0).collect();
-                    let release = Release { epoch: self.epoch, frame, may_show, is_last: self.is_last };
+                    let heard = self.inboxes.iter().map(|(display, inbox)| (*display, inbox.taken())).collect();
+                    let release = Release { epoch: self.epoch, frame, may_show, heard, is_last: self.is_last };
                     if let Err(error) = self.releases.put(bytes_of(&release)).wait() {
                         tracing::warn!("the release of frame {frame} could not be sent: {error}");
                     }

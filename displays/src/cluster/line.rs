@@ -37,13 +37,14 @@ pub(super) struct Line<A> {
 impl<A: Send + 'static> Line<A> {
     /// Links to an application, now or as soon as it is there. `subjects` are what it publishes, `application` tells that it came or went.
     pub(super) fn open(
+        end: End,
         endpoint: &str,
         security: &Security,
         lease: Duration,
         subjects: [Subject<A>; 2],
         application: fn(bool) -> A,
     ) -> Result<Line<A>, ClusterError> {
-        let session = open(endpoint, security, End::Display, lease)?;
+        let session = open(endpoint, security, end, lease)?;
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
         let id = since ^ (std::process::id() as u64) << 40;
         let (sender, arrived) = unbounded();

@@ -4,10 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use umbriel_fields::replica::Deed;
 
+use super::event::Event;
 use super::transport::ClusterError;
 
 /// Spoken by both ends; another one is refused.
-pub(super) const PROTOCOL: u16 = 2;
+pub(super) const PROTOCOL: u16 = 3;
 
 pub(super) const FRAME: &str = "umbriel/frame";
 pub(super) const RELEASE: &str = "umbriel/release";
@@ -83,6 +84,8 @@ pub(super) struct Release {
     pub(super) epoch: u64,
     pub(super) frame: u64,
     pub(super) may_show: Vec<u64>,
+    /// Displays, and the last input that was taken of each.
+    pub(super) heard: Vec<(u64, u64)>,
     /// The application ends after this frame.
     pub(super) is_last: bool,
 }
@@ -108,19 +111,15 @@ pub(super) struct Join {
     pub(super) name: String,
 }
 
-/// Something that happened at a display, for the application: a button, an axis, a picked node.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Input {
-    /// Name of the display.
-    pub display: String,
-    /// Counts from one for each run of the display, without gaps.
-    pub number: u64,
-    /// The node to write, by name.
-    pub node: String,
-    /// The field to write.
-    pub field: String,
-    /// The value, as RON: `true`, `0.5`, `(1.0, 0.0, 0.0)`.
-    pub value: String,
+/// Something happened at a display.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Told {
+    pub(super) display: u64,
+    /// The run of the application that it is for.
+    pub(super) epoch: u64,
+    /// Counts from one in each run of the application.
+    pub(super) number: u64,
+    pub(super) event: Event,
 }
 
 pub(super) fn bytes_of(message: &impl Serialize) -> Vec<u8> {

@@ -10,6 +10,8 @@ pub mod lock;
 #[cfg(feature = "cluster")]
 mod certificates;
 #[cfg(feature = "cluster")]
+mod event;
+#[cfg(feature = "cluster")]
 mod follower;
 #[cfg(feature = "cluster")]
 mod host;
@@ -18,16 +20,20 @@ mod line;
 #[cfg(feature = "cluster")]
 mod message;
 #[cfg(feature = "cluster")]
+mod ordered;
+#[cfg(feature = "cluster")]
 mod proxy;
+#[cfg(feature = "cluster")]
+mod rights;
 #[cfg(feature = "cluster")]
 mod transport;
 
 #[cfg(feature = "cluster")]
 pub use self::{
     certificates::make as make_certificates,
+    event::{Event, Input, Motion, Pointing},
     follower::{Follower, FollowerOptions, FollowerReport, Screen},
     host::{Host, HostOptions, HostReport},
-    message::Input,
     proxy::Proxy,
     transport::{ClusterError, LEASE, Security},
 };

@@ -56,21 +56,21 @@ impl Proxy {
     }
 
     /// Of 1000 pieces, so many are lost and sent again, as TCP does.
-    pub fn lose(&self, of_1000: u64) {
-        self.line.lost_of_1000.store(of_1000, Ordering::Relaxed);
+    pub fn lose(&self, of_1000: u32) {
+        self.line.lost_of_1000.store(of_1000.into(), Ordering::Relaxed);
     }
 
     /// Nothing goes through for a while.
     pub fn cut(&self, duration: Duration) {
-        let until = self.started.elapsed() + duration;
-        self.line.cut_until_us.store(until.as_micros() as u64, Ordering::Relaxed);
+        let until = self.started.elapsed().saturating_add(duration);
+        self.line.cut_until_us.store(u64::try_from(until.as_micros()).unwrap_or(u64::MAX), Ordering::Relaxed);
     }
 }
 
 fn forward(mut from: TcpStream, mut to: TcpStream, line: &Line, started: Instant) {
     let _ = to.set_nodelay(true);
     let mut buffer = vec![0; 65536];
-    let mut random = 0x2545_F491_4F6C_DD1Du64;
+    let mut dice = fastrand::Rng::with_seed(1);
     while let Ok(count) = from.read(&mut buffer)
         && count > 0
     {
@@ -81,10 +81,7 @@ fn forward(mut from: TcpStream, mut to: TcpStream, line: &Line, started: Instant
             }
             std::thread::sleep(Duration::from_micros(cut_us.min(5000)));
         }
-        random ^= random << 13;
-        random ^= random >> 7;
-        random ^= random << 17;
-        let is_lost = random % 1000 < line.lost_of_1000.load(Ordering::Relaxed);
+        let is_lost = dice.u64(..1000) < line.lost_of_1000.load(Ordering::Relaxed);
         let delay = Duration::from_micros(line.delay_us.load(Ordering::Relaxed));
         let pause = if is_lost { delay + RESEND } else { delay };
         if !pause.is_zero() {

@@ -6,6 +6,8 @@ use std::time::Duration;
 
 use zenoh::{Config, Session, Wait};
 
+use super::rights::access_control;
+
 /// Why processes cannot work together.
 #[derive(Debug, thiserror::Error)]
 pub enum ClusterError {
@@ -92,8 +94,23 @@ pub enum Security {
 /// Which end a process is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {
+    /// Evaluates the world.
     Application,
+    /// Shows it.
     Display,
+    /// Works on it as well.
+    Guest,
+}
+
+impl End {
+    /// The common name of its certificate, and the stem of its files.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            End::Application => "application",
+            End::Display => "display",
+            End::Guest => "guest",
+        }
+    }
 }
 
 fn check(endpoint: &str, security: &Security) -> Result<(), ClusterError> {
@@ -118,11 +135,13 @@ fn check(endpoint: &str, security: &Security) -> Result<(), ClusterError> {
 
 /// The files of one end in a folder of certificates.
 fn files(folder: &Path, end: End) -> Result<[String; 3], ClusterError> {
-    let stem = if end == End::Application { "application" } else { "display" };
-    let names = ["authority.pem".to_string(), format!("{stem}.pem"), format!("{stem}.key.pem")];
+    let stem = end.name();
+    let own = format!("{stem}.pem");
+    let names = ["authority.pem".to_string(), own.clone(), format!("{stem}.key.pem")];
     let [authority, certificate, key] = names.map(|name| {
-        let path = folder.join(name);
-        let fault = std::fs::read(&path).map_or_else(|error| Some(error.to_string()), |bytes| fault_of(&bytes));
+        let path = folder.join(&name);
+        let role = (name == own).then_some(stem);
+        let fault = std::fs::read(&path).map_or_else(|error| Some(error.to_string()), |bytes| fault_of(&bytes, role));
         match fault {
             None => Ok(path.to_string_lossy().into_owned()),
             Some(fault) => Err(ClusterError::Certificate { path, fault }),
@@ -135,8 +154,8 @@ fn files(folder: &Path, end: End) -> Result<[String; 3], ClusterError> {
 /// longer want more.
 pub const LEASE: Duration = Duration::from_secs(1);
 
-/// What is wrong with a certificate or a key, if anything is.
-fn fault_of(bytes: &[u8]) -> Option<String> {
+/// What is wrong with a certificate or a key, if anything is. A certificate of a role has it as its common name.
+fn fault_of(bytes: &[u8], role: Option<&str>) -> Option<String> {
     let Ok((_, pem)) = x509_parser::pem::parse_x509_pem(bytes) else {
         return Some("this is no certificate and no key (PEM)".into());
     };
@@ -145,8 +164,12 @@ fn fault_of(bytes: &[u8]) -> Option<String> {
     }
     let Ok(certificate) = pem.parse_x509() else { return Some("the certificate is damaged".into()) };
     let validity = certificate.validity();
-    (!validity.is_valid())
-        .then(|| format!("the certificate is valid from {} to {} only", validity.not_before, validity.not_after))
+    if !validity.is_valid() {
+        return Some(format!("the certificate is valid from {} to {} only", validity.not_before, validity.not_after));
+    }
+    let name = certificate.subject().iter_common_name().next().and_then(|name| name.as_str().ok()).unwrap_or_default();
+    let role = role.filter(|role| *role != name)?;
+    Some(format!("this is the certificate of `{name}`, and one of `{role}` is needed"))
 }
 
 /// What the network library says.
@@ -175,7 +198,7 @@ pub(super) fn open(endpoint: &str, security: &Security, end: End, lease: Duratio
         End::Application => {
             rows.push(("listen/endpoints", format!("[{}]", quoted(endpoint))));
         }
-        End::Display => {
+        End::Display | End::Guest => {
             rows.push(("listen/endpoints", "[]".into()));
             rows.push(("connect/timeout_ms", "-1".into()));
             rows.push(("connect/exit_on_failure", "false".into()));
@@ -192,6 +215,9 @@ pub(super) fn open(endpoint: &str, security: &Security, end: End, lease: Duratio
                  enable_mtls: true, verify_name_on_connect: false, close_link_on_expiration: false }}"
             ),
         ));
+        if end == End::Application {
+            rows.push(("access_control", access_control()));
+        }
     }
     let mut config = Config::default();
     for (key, value) in &rows {
@@ -199,7 +225,7 @@ pub(super) fn open(endpoint: &str, security: &Security, end: End, lease: Duratio
     }
     zenoh::open(config).wait().map_err(|error| match end {
         End::Application => ClusterError::Listen { endpoint: endpoint.into(), fault: reason(&error.to_string()) },
-        End::Display => ClusterError::Network(error.to_string()),
+        End::Display | End::Guest => ClusterError::Network(error.to_string()),
     })
 }
 
@@ -226,20 +252,23 @@ mod tests {
         let of_years = |from, to| {
             let mut params = rcgen::CertificateParams::new(vec!["display".to_string()]).unwrap();
             (params.not_before, params.not_after) = (rcgen::date_time_ymd(from, 1, 1), rcgen::date_time_ymd(to, 1, 1));
+            params.distinguished_name.push(rcgen::DnType::CommonName, "display");
             params.self_signed(&key).unwrap().pem()
         };
         let damaged = of_years(2020, 2049).replacen("MII", "MIJ", 1);
         let rows = [
-            (of_years(2020, 2049), None),
-            (key.serialize_pem(), None),
-            (of_years(2001, 2002), Some("valid from Jan  1 00:00:00 2001")),
-            (of_years(2048, 2049), Some("valid from Jan  1 00:00:00 2048")),
-            ("garbage".into(), Some("no certificate")),
-            (String::new(), Some("no certificate")),
-            (damaged, Some("damaged")),
+            (of_years(2020, 2049), Some("display"), None),
+            (of_years(2020, 2049), None, None),
+            (of_years(2020, 2049), Some("guest"), Some("of `display`, and one of `guest` is needed")),
+            (key.serialize_pem(), None, None),
+            (of_years(2001, 2002), None, Some("valid from Jan  1 00:00:00 2001")),
+            (of_years(2048, 2049), None, Some("valid from Jan  1 00:00:00 2048")),
+            ("garbage".into(), None, Some("no certificate")),
+            (String::new(), None, Some("no certificate")),
+            (damaged, None, Some("damaged")),
         ];
-        for (text, expected) in rows {
-            let fault = fault_of(text.as_bytes());
+        for (text, role, expected) in rows {
+            let fault = fault_of(text.as_bytes(), role);
             match (&fault, expected) {
                 (None, None) => {}
                 (Some(fault), Some(part)) => assert!(fault.contains(part), "{fault}"),

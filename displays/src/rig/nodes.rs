@@ -12,6 +12,7 @@ pub(crate) struct RigNodes {
     seen: Option<Revision>,
     pub(crate) displays: BTreeSet<NodeId>,
     pub(crate) users: BTreeSet<NodeId>,
+    pub(crate) pointers: BTreeSet<NodeId>,
 }
 
 impl RigNodes {
@@ -30,7 +31,8 @@ impl RigNodes {
     fn note(&mut self, graph: &Graph, node: NodeId) {
         let alive = graph.contains(node);
         let type_name = if alive { graph.type_of(node).name.clone() } else { Arc::from("") };
-        for (name, nodes) in [("Display", &mut self.displays), ("User", &mut self.users)] {
+        let lists = [("Display", &mut self.displays), ("User", &mut self.users), ("Pointer", &mut self.pointers)];
+        for (name, nodes) in lists {
             if *type_name == *name {
                 nodes.insert(node);
             } else if !alive {

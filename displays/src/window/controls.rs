@@ -24,6 +24,8 @@ pub(super) enum Action {
 #[derive(Default)]
 pub(super) struct Controls {
     pub(super) cursor: Vec2,
+    /// The mouse moved since the app was told of it.
+    pub(super) strayed: bool,
     buttons: Vec<Button>,
     keys: Vec<KeyCode>,
 }
@@ -33,6 +35,7 @@ impl Controls {
     pub(super) fn moved(&mut self, cursor: Vec2) -> Option<(Button, Vec2)> {
         let pixels = cursor - self.cursor;
         self.cursor = cursor;
+        self.strayed = true;
         self.buttons.first().map(|b| (*b, pixels))
     }
 
@@ -44,6 +47,11 @@ impl Controls {
             _ => return,
         };
         hold(&mut self.buttons, button, state);
+    }
+
+    /// Is the button held that picks?
+    pub(super) fn presses(&self) -> bool {
+        self.buttons.contains(&Button::Left)
     }
 
     /// A key went up or down. Gives what it does once.
@@ -98,12 +106,20 @@ pub(super) fn notches(delta: MouseScrollDelta) -> f32 {
     }
 }
 
-/// The view under the mouse; `cursor` and `window` in pixels of the window, which shows the whole picture.
-pub(super) fn view_at(picture: &Picture, cursor: Vec2, window: [u32; 2]) -> Option<&View> {
-    let Layout::Tiles(tiles) = &picture.layout else { return picture.views.first() };
-    let [x, y] = [0, 1].map(|i| (cursor[i] * picture.size[i] as f32 / window[i].max(1) as f32).max(0.0) as u32);
+/// The view under the mouse, and the place in it from (0, 0) at the top left to (1, 1); `cursor` and `window` in pixels of the window, which
+/// shows the whole picture.
+pub(super) fn view_at(picture: &Picture, cursor: Vec2, window: [u32; 2]) -> Option<(&View, Vec2)> {
+    let at = Vec2::from([0, 1].map(|i| cursor[i] * picture.size[i] as f32 / window[i].max(1) as f32));
+    let Layout::Tiles(tiles) = &picture.layout else {
+        let [width, height] = picture.size.map(|side| side.max(1) as f32);
+        return picture.views.first().map(|view| (view, at / Vec2::new(width, height)));
+    };
+    let [x, y] = at.max(Vec2::ZERO).to_array().map(|place| place as u32);
     let inside = |r: &umbriel_scene::Rect| (r.x..r.x + r.width).contains(&x) && (r.y..r.y + r.height).contains(&y);
-    picture.views.get(tiles.iter().position(inside).unwrap_or(0))
+    let place = tiles.iter().position(inside).unwrap_or(0);
+    let (tile, view) = (tiles.get(place)?, picture.views.get(place)?);
+    let corner = Vec2::new(tile.x as f32, tile.y as f32);
+    Some((view, (at - corner) / Vec2::new(tile.width.max(1) as f32, tile.height.max(1) as f32)))
 }
 
 /// The view that leads ahead, wherever the mouse is: of several walls the one that an unturned head looks at, along -z.
@@ -168,9 +184,11 @@ mod tests {
         let row = Arrangement::Row.picture("row".into(), vec![view("a"), view("b"), view("c")], 1).unwrap();
         // The window is half as large as the picture.
         for (x, y, want) in [(10.0, 10.0, "a"), (60.0, 49.0, "b"), (149.0, 0.0, "c"), (900.0, -7.0, "a")] {
-            assert_eq!(view_at(&row, Vec2::new(x, y), [150, 50]).unwrap().name, want, "{x} {y}");
+            assert_eq!(view_at(&row, Vec2::new(x, y), [150, 50]).unwrap().0.name, want, "{x} {y}");
         }
+        assert_eq!(view_at(&row, Vec2::new(75.0, 10.0), [150, 50]).unwrap().1, Vec2::new(0.5, 0.2));
     }
+
     #[test]
     fn of_many_walls_the_front_one_leads_ahead() {
         let room = room_screens(3.0, 3.0, 3.0);

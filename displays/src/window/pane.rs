@@ -7,7 +7,8 @@ use umbriel_render::Gpu;
 use wgpu::CurrentSurfaceTexture;
 use winit::dpi::PhysicalSize;
 use winit::event_loop::ActiveEventLoop;
-use winit::window::{Window, WindowId};
+use winit::monitor::MonitorHandle;
+use winit::window::{Fullscreen, Window, WindowId};
 
 /// Part of a monitor that a new window takes at most.
 const OF_MONITOR: f64 = 0.9;
@@ -26,10 +27,14 @@ pub(super) struct Pane {
 }
 
 impl Pane {
-    /// Opens a window of `size` pixels, or smaller in the same proportion where the monitor is.
-    pub(super) fn open(target: &ActiveEventLoop, name: &str, size: [u32; 2]) -> Result<Pane, Error> {
+    /// Opens a window that fills a monitor, or one of `size` pixels, smaller in the same proportion where the monitor is.
+    pub(super) fn open(target: &ActiveEventLoop, name: &str, size: [u32; 2], fullscreen: Option<usize>) -> Result<Pane, Error> {
         let room = target.primary_monitor().or_else(|| target.available_monitors().next()).map(|m| m.size());
-        let attributes = Window::default_attributes().with_title(name).with_inner_size(fitted(size, room));
+        let attributes = Window::default_attributes().with_title(name);
+        let attributes = match fullscreen {
+            Some(number) => attributes.with_fullscreen(Some(Fullscreen::Borderless(Some(monitor(target, number)?)))),
+            None => attributes.with_inner_size(fitted(size, room)),
+        };
         let window = target.create_window(attributes).map_err(|e| Error::Window(e.to_string()))?;
         let PhysicalSize { width, height } = window.inner_size();
         Ok(Pane {
@@ -117,6 +122,19 @@ impl Pane {
         }
         Ok(())
     }
+}
+
+/// A monitor by its number, from zero.
+fn monitor(target: &ActiveEventLoop, number: usize) -> Result<MonitorHandle, Error> {
+    let sizes = || {
+        let told = |(number, monitor): (usize, MonitorHandle)| {
+            let PhysicalSize { width, height } = monitor.size();
+            format!("{number} ({width}x{height})")
+        };
+        target.available_monitors().enumerate().map(told).collect::<Vec<_>>().join(", ")
+    };
+    let found = target.available_monitors().nth(number);
+    found.ok_or_else(|| Error::Window(format!("there is no monitor {number}; there are: {}", sizes())))
 }
 
 fn fitted(size: [u32; 2], monitor: Option<PhysicalSize<u32>>) -> PhysicalSize<u32> {

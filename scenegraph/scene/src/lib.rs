@@ -17,6 +17,7 @@ mod layer;
 mod light;
 mod material;
 mod mesh;
+mod pick;
 mod reduce;
 mod scene;
 mod score;
@@ -34,6 +35,7 @@ pub use material::{
     AlphaMode, Filter, FragmentShader, Image, Material, Sampler, ShaderParam, ShaderSource, Shading, TextureRef, Wrap,
 };
 pub use mesh::{Mesh, MeshError, MorphTarget, Topology};
+pub use pick::Picked;
 pub use reduce::{ReduceError, ReducedMesh, reduce};
 pub use scene::{
     Background, ContourGroup, ContourStyle, Drawable, Film, Fog, FogKind, Pose, Samples, Scene, StandIn, StencilGroup,

@@ -45,5 +45,17 @@ pub(super) fn types() -> Vec<NodeType> {
             .field(Field::new("near", 0.1f32).unit("m").doc("Nearest distance that is drawn."))
             .field(Field::many::<Vec4>("frusta").doc("Left, right, bottom, top tangents per eye, for headsets."))
             .field(Field::node("viewpoint").doc("A Viewpoint; none: the first of the scene.")),
+        NodeType::new("Pointer", "What the mouse points at, in the window of any display, on any machine.")
+            .field(Field::new("enabled", true).doc("Whether displays write here."))
+            .field(Field::new("display", "").doc("The only display whose mouse counts; empty: all of them."))
+            .field(Field::new("shown_on", "").doc("The display that the mouse is on."))
+            .field(metres("origin", Vec3::ZERO, "The eye that looks past the mouse, in the world."))
+            .field(Field::new("direction", Vec3::NEG_Z).doc("From there to where the mouse points, in the world."))
+            .field(Field::node("over").doc("The Shape under the mouse, if there is one."))
+            .field(metres("point", Vec3::ZERO, "Where on it, in the world."))
+            .field(Field::new("normal", Vec3::Y).doc("Of its surface there, in the world."))
+            .field(Field::new("pressed", false).doc("The left button is held."))
+            .field(Field::node("picked").doc("The Shape on which the button was pressed last; none: it was pressed on nothing."))
+            .field(Field::new("clicks", 0i32).doc("How often the button was pressed.")),
     ]
 }

@@ -15,7 +15,8 @@ use crate::cluster::message::{
     DEEDS, FRAME, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word, bytes_of, message_of,
     unstamped,
 };
-use crate::cluster::transport::network;
+use crate::cluster::ordered::Outbox;
+use crate::cluster::transport::{End, network};
 use crate::cluster::{ClusterError, LEASE, Security};
 
 /// What is not confirmed after so long is sent again.
@@ -93,9 +94,8 @@ pub struct Guest {
     heard: Vec<Word>,
     names: BTreeMap<u64, Arc<str>>,
     host: Arc<str>,
-    sent: u64,
+    told: Outbox<Vec<u8>>,
     applied: u64,
-    unconfirmed: BTreeMap<u64, (Vec<u8>, Instant)>,
     locks_asked: BTreeSet<NodeId>,
     asked: Option<Instant>,
     refused_since: Option<Instant>,
@@ -113,7 +113,7 @@ impl Guest {
         fresh: fn() -> Graph,
     ) -> Result<Guest, ClusterError> {
         let subjects = [(FRAME, Arrived::Frame as fn(Vec<u8>) -> Arrived), (WORD, Arrived::Word)];
-        let mut line = Line::open(endpoint, security, LEASE, subjects, Arrived::Host)?;
+        let mut line = Line::open(End::Guest, endpoint, security, LEASE, subjects, Arrived::Host)?;
         let deeds = line.session.declare_publisher(DEEDS).congestion_control(CongestionControl::Block).wait().map_err(network)?;
         line.announce(GUEST)?;
         Ok(Guest {
@@ -135,9 +135,8 @@ impl Guest {
             heard: Vec::new(),
             names: BTreeMap::new(),
             host: "".into(),
-            sent: 0,
+            told: Outbox::default(),
             applied: 0,
-            unconfirmed: BTreeMap::new(),
             locks_asked: BTreeSet::new(),
             asked: None,
             refused_since: None,
@@ -258,9 +257,9 @@ impl Guest {
         self.packets.clear();
         self.words.clear();
         self.heard.clear();
-        self.unconfirmed.clear();
+        self.told = Outbox::default();
         self.locks_asked.clear();
-        (self.epoch, self.sent, self.applied, self.asked) = (0, 0, 0, None);
+        (self.epoch, self.applied, self.asked) = (0, 0, None);
     }
 
     fn fetch_again(&mut self) {
@@ -279,8 +278,7 @@ impl Guest {
     }
 
     fn resend(&mut self) {
-        for (bytes, sent) in self.unconfirmed.values_mut().filter(|(_, sent)| sent.elapsed() > RESEND) {
-            *sent = Instant::now();
+        for bytes in self.told.overdue(RESEND) {
             if let Err(error) = self.deeds.put(bytes.clone()).wait() {
                 tracing::debug!("cannot tell: {error}");
             }
@@ -342,8 +340,8 @@ impl Guest {
         if is_first {
             self.graph = (self.fresh)();
             self.types = self.graph.types().clone();
-            (self.mirror, self.sent, self.applied) = (None, 0, 0);
-            self.unconfirmed.clear();
+            (self.mirror, self.applied) = (None, 0);
+            self.told = Outbox::default();
             self.locks_asked.clear();
         }
         let made = Replica::new(&packet, self.types.clone(), &self.bulk);
@@ -386,7 +384,7 @@ impl Guest {
                 tracing::error!("not done: {why}");
             }
         }
-        self.unconfirmed = self.unconfirmed.split_off(&(self.applied + 1));
+        self.told.confirm(self.applied);
         mirror.follow(replica, graph, self.applied);
         for (node, is_here) in mirror.foreign() {
             match is_here {
@@ -426,7 +424,7 @@ impl Guest {
             Some(holder) => *holder == self.name,
             None => !whose.owners.contains_key(&node),
         };
-        let told = mirror.deeds(graph, replica, self.sent + 1, &is_ours);
+        let told = mirror.deeds(graph, replica, self.told.next(), &is_ours);
         let mut requests = Vec::new();
         for wish in wishes {
             requests.extend(match wish {
@@ -447,12 +445,12 @@ impl Guest {
     }
 
     fn send(&mut self, deeds: Vec<umbriel_fields::replica::Deed>, images: Vec<(u64, Vec<u8>)>, requests: Vec<GuestRequest>) {
-        self.sent += 1;
-        let bytes = bytes_of(&GuestMessage { guest: self.line.id, number: self.sent, deeds, images, requests });
+        let number = self.told.next();
+        let bytes = bytes_of(&GuestMessage { guest: self.line.id, number, deeds, images, requests });
         if let Err(error) = self.deeds.put(bytes.clone()).wait() {
             tracing::debug!("cannot tell: {error}");
         }
-        self.unconfirmed.insert(self.sent, (bytes, Instant::now()));
+        self.told.sent(bytes);
     }
 
     /// Says good-bye, and waits a moment until everything that was told is done.
