@@ -36,7 +36,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
     let truncated = folder("command").join("truncated.glb");
     std::fs::write(&truncated, b"glTF\x02\0\0\0\xff\0\0\0").expect("a file can be written");
     // Name, line of the world, what the message must contain. The rest of the world is drawn.
-    let rows: [(&str, &str, &[&str]); 26] = [
+    let rows: [(&str, &str, &[&str]); 31] = [
         (
             "negative_soft_range",
             r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "volume", soft: "range", soft_range: -1.0 }));"#,
@@ -111,6 +111,31 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
             "projector_without_direction",
             r#"let c = make("ProjectedTextureCoordinate", #{ name: "slide", projector: make("PointLight") }); let m = make("GeneratedShadowMap"); world.add(shape(make("Box"), make("Appearance", #{ texture: m, texCoord: c })));"#,
             &["projector_without_direction.rhai:4:9", "'slide', projector: a PointLight has no direction to project along"],
+        ),
+        (
+            "near_is_far",
+            r#"world.add(make("SpotLight", #{ name: "spot", shadows: "map", shadow_near_far: vec2(2.0, 2.0) }));"#,
+            &["near_is_far.rhai:4:11", "spot", "shadow_near_far", "makes no sense here"],
+        ),
+        (
+            "location_that_is_no_number",
+            r#"world.add(make("PointLight", #{ name: "lamp", location: vec3(0, 0.0/0.0, 0), shadows: "map" }));"#,
+            &["location_that_is_no_number.rhai:4:11", "'lamp', location", "NaN"],
+        ),
+        (
+            "projection_from_nowhere",
+            r#"world.add(make("DirectionalLight", #{ name: "sun", projectionLocation: vec3(0, 0.0/0.0, 0) }));"#,
+            &["projection_from_nowhere.rhai:4:11", "'sun', projection_location", "NaN"],
+        ),
+        (
+            "sun_from_nowhere",
+            r#"world.add(make("LightSource", #{ name: "sun", position: vec4(0, 0.0/0.0, 0, 0) }));"#,
+            &["sun_from_nowhere.rhai:4:11", "'sun', position", "NaN"],
+        ),
+        (
+            "performer_to_nowhere",
+            r#"world.add(make("LightSource", #{ name: "spot", position: vec4(0, 1, 0, 1), spot_dir: vec3(0, 0, 0) }));"#,
+            &["performer_to_nowhere.rhai:4:11", "'spot', spot_dir", "makes no sense here"],
         ),
         (
             "missing_texture",
@@ -391,6 +416,26 @@ world.add(make("Viewpoint", #{ position: vec3(0, 2, 8) }));
     for (light, message) in [("plain", "has no shadow map"), ("nobody", "spot, lamp, plain")] {
         let run = umbriel(&["shadow-map", world, "--light", light]);
         assert!(!run.ok && run.stderr.contains(message), "{light}: {}", run.stderr);
+    }
+}
+
+/// Coarse maps and lights without casters are no mistakes.
+#[test]
+fn coarse_and_empty_maps_are_drawn() {
+    let lights = |fields: &str| {
+        ["DirectionalLight", "SpotLight", "PointLight"]
+            .map(|kind| format!(r#"world.add(make("{kind}", #{{ shadows: "map", filter: "pcss", {fields} }}));"#))
+            .concat()
+    };
+    let casts_nothing = BACKDROP.replace("[shape(", "[no_caster(");
+    let no_caster = "fn no_caster(geometry, look) { let s = shape(geometry, look); s.cast_shadow = false; s }";
+    for (name, script) in [
+        ("map_of_size_1", format!("{BACKDROP}{}", lights("shadow_size: 1"))),
+        ("map_of_size_3", format!("{BACKDROP}{}", lights("shadow_size: 3"))),
+        ("no_casters", format!("{no_caster}{casts_nothing}{}", lights("shadow_size: 64"))),
+    ] {
+        let (run, picture) = draw(name, &script, &[]);
+        assert!(run.ok && corner_is_red(&picture), "{name}: {}{}", run.stdout, run.stderr);
     }
 }
 

@@ -40,16 +40,22 @@ pub(super) fn read_any_light(graph: &Graph, node: NodeId, problems: &mut Problem
         soft: read.choice("soft") != 0,
         ..Light::default()
     };
+    // Fields that say where the light is and where it shines.
+    let (mut place, mut aim) = ("location", "direction");
     match &*graph.type_of(node).name {
         "DirectionalLight" => {
             light.direction = read.get("direction");
-            light.position = read.get("projection_location");
+            place = "projection_location";
+            light.position = read.get(place);
         }
         "PointLight" => {
             light.kind = LightKind::Point;
             light.position = read.get("location");
         }
-        "LightSource" => light_source(&read, &mut light),
+        "LightSource" => {
+            place = "position";
+            aim = light_source(&read, &mut light);
+        }
         _ => {
             let outer_rad = read.get::<f32>("cut_off_angle");
             light.kind = cone(outer_rad, read.get::<f32>("beam_width"));
@@ -57,8 +63,8 @@ pub(super) fn read_any_light(graph: &Graph, node: NodeId, problems: &mut Problem
             light.direction = read.get("direction");
         }
     }
-    light.position = check.finite("position", light.position, Vec3::ZERO, |p| p.is_finite());
-    light.direction = check.finite("direction", light.direction, Vec3::NEG_Z, |d| d.try_normalize().is_some());
+    light.position = check.finite(place, light.position, Vec3::ZERO, |p| p.is_finite());
+    light.direction = check.finite(aim, light.direction, Vec3::NEG_Z, |d| d.try_normalize().is_some());
     let parallel = light.kind == LightKind::Directional;
     let usual = if parallel { PI } else { 100.0 };
     light.intensity = check.finite("intensity", read.get("intensity"), usual, |x: &f32| x.is_finite() && *x >= 0.0);
@@ -103,13 +109,13 @@ fn size(read: &Reader<'_>, parallel: bool, check: &mut Check<'_>) -> f32 {
     if read.choice("soft") == 2 { by_range } else { by_size }
 }
 
-/// The light of Performer (000 section 4.1): the position's w tells its kind.
-fn light_source(read: &Reader<'_>, light: &mut Light) {
+/// The light of Performer (000 section 4.1): the position's w tells its kind. Gives the field that says where it shines.
+fn light_source(read: &Reader<'_>, light: &mut Light) -> &'static str {
     let position: Vec4 = read.get("position");
     if position.w == 0.0 {
         // The position of a parallel light is where it comes from.
         light.direction = -position.truncate();
-        return;
+        return "position";
     }
     light.position = position.truncate() / position.w;
     light.direction = read.get("spot_dir");
@@ -118,6 +124,7 @@ fn light_source(read: &Reader<'_>, light: &mut Light) {
     let outer_rad = spread_deg.to_radians();
     let inner_rad = if exponent > 0.0 { 0.95f32.powf(1.0 / exponent).acos() } else { outer_rad };
     light.kind = cone(outer_rad, inner_rad);
+    "spot_dir"
 }
 
 fn cone(outer_rad: f32, inner_rad: f32) -> LightKind {

@@ -139,7 +139,7 @@ fn up_turns_and_bad_values_are_told() {
         ("PointLight", "projection_far", nan.into(), "projection_far"),
         ("DirectionalLight", "projection_rectangle", Vec4::new(1.0, 1.0, 1.0, 2.0).into(), "projection_rectangle"),
         ("DirectionalLight", "projection_rectangle", Vec4::new(nan, 0.0, 1.0, 2.0).into(), "projection_rectangle"),
-        ("DirectionalLight", "projection_location", vec3(nan, 0.0, 0.0).into(), "position"),
+        ("DirectionalLight", "projection_location", vec3(nan, 0.0, 0.0).into(), "projection_location"),
         ("SpotLight", "default_shadow_map", Value::Node(None), ""),
     ];
     for (kind, field, value, expected) in rows {
