@@ -42,4 +42,5 @@ pub use error::Error;
 pub use gpu::Gpu;
 pub use read_back::{GreyPixels, RgbaPixels};
 pub use renderer::Renderer;
+pub use shaders::surface as surface_wgsl;
 pub use stats::{FrameStats, MapShare};

@@ -36,8 +36,9 @@ pub(crate) const HOOKS: &str = include_str!("shaders/hooks.wgsl");
 /// Layers need the surface's fragment, which shaders of authors do not see.
 pub(crate) const SURFACE_BEHIND_HOOKS: &str = concat!(include_str!("shaders/layers.wgsl"), include_str!("surface.wgsl"));
 
-/// The shader of surfaces that bring none of their own.
-pub(crate) fn surface() -> String {
+/// WGSL of surfaces that bring no shader of their own, as the renderer compiles it: for programs that measure themselves
+/// against it.
+pub fn surface() -> String {
     [&SURFACE_BEFORE_HOOKS.concat(), &crate::author::standard_hooks(), SURFACE_BEHIND_HOOKS].concat()
 }
 
