@@ -6,11 +6,15 @@ use crate::headless::{describe, progress};
 use crate::png;
 use crate::scene_file::{self, SceneFile};
 use crate::session::Session;
+use glam::Vec3;
 use std::path::Path;
 use std::sync::Arc;
 use umbriel_displays::WindowSizes;
 use umbriel_render::{Gpu, Renderer, RgbaPixels};
-use umbriel_scene::{Mask, Picture, PictureKind, Scene, ShadowMethod, Shares, TraceOptions, Tracer, View, difference, score};
+use umbriel_scene::{
+    Mask, Picture, PictureKind, Scene, ShadowMethod, Shares, TraceOptions, Tracer, View, difference, origin_near_eyes, score,
+    specks,
+};
 use umbriel_scenegraph::Extractor;
 
 type Failure = Box<dyn std::error::Error>;
@@ -26,6 +30,18 @@ pub(crate) struct Subject {
     pub(crate) problems: Vec<String>,
 }
 
+impl Subject {
+    /// Moves a world far from the origin to where the tracer's numbers are as fine as the renderer's.
+    fn come_home(&mut self) {
+        let picture = Picture::mono(self.view.clone());
+        let origin = origin_near_eyes(Vec3::ZERO, std::slice::from_ref(&picture));
+        if origin != Vec3::ZERO {
+            self.scene = self.scene.around(origin);
+            self.view = picture.around(origin).views.remove(0);
+        }
+    }
+}
+
 /// Renders, traces, and prints the score; gives the number of problems that were reported.
 pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
     let mut subject = match (&args.scene, &args.path) {
@@ -33,6 +49,7 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
         (None, Some(path)) => from_world(path, args)?,
         (None, None) => unreachable!("the command line asks for one of them"),
     };
+    subject.come_home();
     let light = &mut subject.scene.lights[subject.light];
     if let Some(method) = args.method {
         light.shadows = method.into();
@@ -69,6 +86,12 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
         png::write(path, &RgbaPixels { width, height, rgba: difference(&truth, &visibility)? }, &by)?;
     }
     println!("{shown}, view '{}' {}x{}, {by}", subject.view.name, subject.view.size[0], subject.view.size[1]);
+    let away = specks(&truth, &visibility)?;
+    println!(
+        "away from edges: {:.4}% of what is lit is dark, {:.4}% of what is dark is lit",
+        100.0 * away.dark,
+        100.0 * away.lit
+    );
     println!("disagreement={:.4}% iou={:.4} pixels={}", 100.0 * score.disagreement, score.iou, score.pixels);
     let light = &subject.scene.lights[subject.light];
     if args.penumbra || (light.soft && light.shadows == ShadowMethod::Volume) {

@@ -22,8 +22,9 @@ use crate::surface::{FrameNeeds, Pass, Surface};
 use crate::targets::{Target, ViewTargets};
 use crate::volumes::{Depth, VolumeJob, VolumePass};
 use crate::{Error, Gpu, buffer::GrowBuffer, gpu, jobs, surroundings, uniforms};
+use glam::Vec3;
 use std::time::Instant;
-use umbriel_scene::{Aabb, Material, Mesh, Picture, Samples, Scene};
+use umbriel_scene::{Aabb, Material, Mesh, Picture, Samples, Scene, origin_near_eyes};
 
 /// Draws frames.
 pub struct Renderer {
@@ -50,6 +51,8 @@ pub struct Renderer {
     clock: Clock,
     frame: u64,
     samples: Samples,
+    /// Frames are drawn around this place of the world.
+    origin: Vec3,
 }
 
 impl Renderer {
@@ -80,6 +83,7 @@ impl Renderer {
             clock: Clock::new(device, &gpu.queue),
             frame: 0,
             samples,
+            origin: Vec3::ZERO,
             layouts,
             gpu: gpu.clone(),
         })
@@ -93,6 +97,17 @@ impl Renderer {
     /// Draws some pictures of a frame, the others of which are drawn elsewhere. Maps are fitted to the views of `all` of them, so that
     /// shadows go on without a seam from one process to the next.
     pub fn render_part(&mut self, scene: &Scene, pictures: &[Picture], all: &[Picture]) -> Result<FrameStats, Error> {
+        self.origin = origin_near_eyes(self.origin, all);
+        if self.origin == Vec3::ZERO {
+            return self.render_here(scene, pictures, all);
+        }
+        let around = |pictures: &[Picture]| pictures.iter().map(|p| p.around(self.origin)).collect::<Vec<_>>();
+        let (pictures, all) = (around(pictures), around(all));
+        self.render_here(&scene.around(self.origin), &pictures, &all)
+    }
+
+    /// The same where numbers are fine enough as they are.
+    fn render_here(&mut self, scene: &Scene, pictures: &[Picture], all: &[Picture]) -> Result<FrameStats, Error> {
         let start = Instant::now();
         let mut stats = FrameStats::default();
         self.frame += 1;

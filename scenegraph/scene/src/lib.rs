@@ -13,6 +13,7 @@ mod bounds;
 mod deform;
 mod distance;
 pub mod doctor;
+mod far;
 mod layer;
 mod light;
 mod material;
@@ -21,6 +22,7 @@ mod pick;
 mod reduce;
 mod scene;
 mod score;
+mod specks;
 mod tangents;
 mod trace;
 mod view;
@@ -29,6 +31,7 @@ mod volume;
 pub use adjacency::{Edge, Edges};
 pub use bounds::Aabb;
 pub use deform::{Deformed, deformed};
+pub use far::origin_near_eyes;
 pub use layer::{Coordinates, Layer, LayerMode, LayerSource, MapCompare, Projector};
 pub use light::{Light, LightKind, MapFilter, MapSettings, MapUpdate, ShadowMethod};
 pub use material::{
@@ -42,6 +45,7 @@ pub use scene::{
     StencilMode,
 };
 pub use score::{Score, difference, score};
+pub use specks::{Specks, specks};
 pub use tangents::tangents;
 pub use trace::{Mask, MaskError, PenumbraScore, Shares, TraceError, TraceOptions, Tracer, trace_visibility};
 pub use view::{Frustum, Layout, Picture, PictureKind, Rect, View};
