@@ -33,6 +33,14 @@ impl Planes {
             n.dot(b.centre) + plane.w + n.abs().dot(b.half) >= 0.0
         })
     }
+
+    /// True only where all of the box is inside for certain.
+    pub(crate) fn see_all_of(&self, b: &CentredBox) -> bool {
+        self.0.iter().all(|plane| {
+            let n = plane.truncate();
+            n.dot(b.centre) + plane.w - n.abs().dot(b.half) >= 0.0
+        })
+    }
 }
 
 #[cfg(test)]
@@ -56,6 +64,10 @@ mod tests {
         ] {
             let b = CentredBox { centre: Vec3::from(centre), half: Vec3::splat(0.5) };
             assert_eq!(planes.may_see(&b), seen, "{centre:?}");
+        }
+        for (centre, whole) in [([0.0, 0.0, -5.0], true), ([2.5, 0.0, -5.0], false), ([0.0, 0.0, -0.3], false)] {
+            let b = CentredBox { centre: Vec3::from(centre), half: Vec3::splat(0.5) };
+            assert_eq!(planes.see_all_of(&b), whole, "{centre:?}");
         }
     }
 }

@@ -5,13 +5,28 @@ use glam::{Mat4, Vec3};
 use umbriel_scene::{Aabb, Light};
 
 /// A view as the fit sees it: its rays, and how far along them something receives.
+#[derive(Clone, Debug)]
 pub(crate) struct Eye {
     pub(crate) world_from_view: Mat4,
     /// Left, right, bottom, top at distance 1.
     pub(crate) window: [f32; 4],
+    /// Distance along -z of the nearest receiver in sight, that of the view's own near plane at least.
     pub(crate) near: f32,
     /// Distance along -z of the farthest receiver in sight.
     pub(crate) far: f32,
+}
+
+impl Eye {
+    /// Nearest and farthest distance along -z of what the view sees of a box; none where it sees nothing of it.
+    pub(crate) fn depths_of(&self, bounds: &Aabb) -> Option<[f32; 2]> {
+        // A flat floor is a box without height; rounding must not make it vanish.
+        let slack = 1e-6 * (1.0 + bounds.min.abs().max(bounds.max.abs()).max_element());
+        let bounds = Aabb { min: bounds.min - slack, max: bounds.max + slack };
+        let ahead = -self.world_from_view.z_axis.truncate();
+        let start = ahead.dot(self.world_from_view.w_axis.truncate());
+        let depths = slice_of(self, 0.0, self.far, &bounds).into_iter().map(|p| ahead.dot(p) - start);
+        depths.fold(None, |range: Option<[f32; 2]>, d| Some(range.map_or([d, d], |[near, far]| [near.min(d), far.max(d)])))
+    }
 }
 
 /// The maps of a directional light, the finest first. `receivers` and `casters` are boxes in the world.
@@ -186,6 +201,20 @@ mod tests {
         assert!((seen.max.z + 0.5).abs() < 1e-4 && (seen.min.z + 8.0).abs() < 1e-4, "{seen:?}");
         assert!((seen.max.x - 5.0).abs() < 1e-4);
         assert!(Aabb::from_points(slice_of(&eye, 9.0, 10.0, &floor)).is_empty());
+    }
+
+    #[test]
+    fn of_a_wide_floor_only_what_is_in_sight_counts() {
+        let floor = Aabb { min: Vec3::new(-2e3, 0.0, -2e3), max: Vec3::new(2e3, 0.0, 2e3) };
+        // From 2 m above, the middle of the view 45 degrees down, the window 45 degrees high: 67.5 to 22.5 degrees down.
+        let world_from_view = Mat4::from_translation(Vec3::Y * 2.0) * Mat4::from_rotation_x(-std::f32::consts::FRAC_PI_4);
+        let edge = std::f32::consts::FRAC_PI_8.tan();
+        let eye = Eye { world_from_view, window: [-edge, edge, -edge, edge], near: 0.1, far: 4e3 };
+        let [near, far] = eye.depths_of(&floor).unwrap();
+        let (expected_near, expected_far) = (2.0, 2.0 / std::f32::consts::FRAC_PI_8.sin() * std::f32::consts::FRAC_PI_8.cos());
+        assert!((near - expected_near).abs() < 1e-2 && (far - expected_far).abs() < 1e-2, "{near} {far}");
+        let behind = Aabb { min: Vec3::new(-1.0, 0.0, 5.0), max: Vec3::new(1.0, 1.0, 6.0) };
+        assert_eq!(eye.depths_of(&behind), None);
     }
 
     #[test]

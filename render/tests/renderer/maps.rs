@@ -150,7 +150,7 @@ fn maps_do_not_depend_on_the_number_of_views() {
         assert_eq!(stats[1].map_redraws, 0, "{views} views of a world that stands still");
         costs.push((stats[0].map_redraws, stats[0].map_draws));
     }
-    assert!(costs[0].0 > 0 && costs.iter().all(|c| *c == costs[0]), "{costs:?}");
+    assert!(costs[0].0 > 0 && costs.iter().all(|c| c.0 == costs[0].0 && c.1 <= costs[0].1), "{costs:?}");
 }
 
 #[test]
