@@ -14,3 +14,4 @@ mod support;
 mod views;
 mod window;
 mod worlds;
+mod x3d_shadows;

@@ -88,7 +88,7 @@ pub(crate) struct Draws {
 pub(crate) struct Caster {
     /// Its place in [`umbriel_scene::Scene::drawables`].
     pub(crate) index: usize,
-    /// Mesh, material and revision of the deformation.
+    /// Mesh, material where that cuts holes, and revision of the deformation.
     pub(crate) content: [u64; 3],
     pub(crate) world_from_object: Mat4,
     /// Middle of the mesh at rest, and how far it reaches from there, in the space of the object.
@@ -275,9 +275,10 @@ impl Draws {
     /// All drawables that cast.
     pub(crate) fn casters(&self, drawables: &[Drawable], revision: impl Fn(u32) -> u64) -> Vec<Caster> {
         let casting = self.slots.iter().zip(drawables).enumerate().filter(|(_, (s, _))| s.drawn && s.casts);
+        let holes = |slot: &Slot| if slot.kind.alpha == Alpha::Mask { 1 + u64::from(slot.material) } else { 0 };
         let caster = |(i, (slot, d)): (usize, (&Slot, &Drawable))| Caster {
             index: i,
-            content: [u64::from(slot.mesh), u64::from(slot.material), slot.deformed.map_or(0, &revision)],
+            content: [u64::from(slot.mesh), holes(slot), slot.deformed.map_or(0, &revision)],
             world_from_object: d.world_from_object,
             centre: d.mesh.bounds.centre(),
             reach: d.mesh.bounds.radius(),

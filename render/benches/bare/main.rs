@@ -141,13 +141,7 @@ fn shadow_passes(gpu: &Gpu, objects: usize) {
         let clock = if row.clock.is_empty() { "none".to_owned() } else { format!("{:.3}", median(row.clock) * 1e3) };
         let (cost, stats) = (median(row.costs), &row.stats);
         let views = row.pictures.len();
-        println!(
-            "{views:6} {:5} {:6} {:8.2} {:12.3}  {clock}",
-            stats.map_redraws,
-            stats.map_draws,
-            cost * 1e3,
-            cost / one
-        );
+        println!("{views:6} {:5} {:6} {:8.2} {:12.3}  {clock}", stats.map_redraws, stats.map_draws, cost * 1e3, cost / one);
     }
 }
 

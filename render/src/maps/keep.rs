@@ -52,7 +52,8 @@ pub(crate) fn motion(old: &Snapshot, new: &Snapshot) -> Motion {
     let pairs = pairs(&old.casters, &new.casters);
     let together: Vec<(&Caster, &Caster)> = pairs.iter().filter_map(|(a, b)| Some(((*a)?, (*b)?))).collect();
     let tolerance = TOLERANCE * new.radius;
-    let strays_of = |m: &Mat4| together.iter().filter(|(a, b)| !moved_by(m, a, b, tolerance)).count();
+    // One that looks otherwise now says as much of how all moved.
+    let strays_of = |m: &Mat4| together.iter().filter(|(a, b)| !is_carried(m, a, b, tolerance)).count();
     let mut best = (strays_of(&Mat4::IDENTITY), Mat4::IDENTITY);
     for guess in 0..GUESSES.min(together.len()) {
         if best.0 == 0 {
@@ -70,7 +71,8 @@ pub(crate) fn motion(old: &Snapshot, new: &Snapshot) -> Motion {
     let mut is_exact = new_from_old == Mat4::IDENTITY;
     for (a, b) in pairs {
         if let (Some(a), Some(b)) = (a, b)
-            && moved_by(&new_from_old, a, b, tolerance)
+            && a.content == b.content
+            && is_carried(&new_from_old, a, b, tolerance)
         {
             is_exact &= a.world_from_object == b.world_from_object;
             continue;
@@ -96,10 +98,7 @@ fn pairs<'a>(old: &'a [Caster], new: &'a [Caster]) -> Vec<(Option<&'a Caster>, O
     }
 }
 
-fn moved_by(new_from_old: &Mat4, a: &Caster, b: &Caster, tolerance: f32) -> bool {
-    if a.content != b.content {
-        return false;
-    }
+fn is_carried(new_from_old: &Mat4, a: &Caster, b: &Caster, tolerance: f32) -> bool {
     let expected = *new_from_old * a.world_from_object;
     let linear = (0..3).map(|i| (expected.col(i) - b.world_from_object.col(i)).length()).fold(0.0, f32::max);
     let moved = (expected.transform_point3(a.centre) - b.world_from_object.transform_point3(a.centre)).length();
@@ -136,6 +135,12 @@ impl Held {
         }
         fit.projection.eye = wanted.projection.eye;
         fit.still_serves(wanted).then_some(fit)
+    }
+
+    /// Is the light where it was when the map was drawn?
+    pub(crate) fn light_stands(&self, light: &Light) -> bool {
+        let pose = |l: &Light| (l.position, l.direction, l.up);
+        pose(&self.light) == pose(light)
     }
 
     /// The map of a light with a position as it lies if it stuck to its light, whatever the casters did.

@@ -19,6 +19,7 @@ use crate::{cull::Planes, shaders};
 pub(crate) use cascades::Eye;
 pub(crate) use fit::projector;
 use fit::{Fit, Projection};
+use glam::Mat4;
 use keep::{Held, Motion, Snapshot};
 use share::Demand;
 use std::collections::HashMap;
@@ -202,7 +203,9 @@ impl Maps {
             let lies_here = held.is_some_and(|h| h.tile == *tile);
             let (fit, is_stale) = match (held, carried) {
                 (Some(held), carried) if wanted.is_frozen => {
-                    let frozen = || Fit { projection: held.fit.projection.carried(&motion_of(held).new_from_old), needed: None };
+                    // Parallel light has no place that tells how it turned with the world; its casters do.
+                    let new_from_old = if held.light_stands(light) { Mat4::IDENTITY } else { motion_of(held).new_from_old };
+                    let frozen = || Fit { projection: held.fit.projection.carried(&new_from_old), needed: None };
                     let from_light = || if held.fit.projection.eye.w > 0.5 { held.with_light(light) } else { frozen() };
                     (carried.unwrap_or_else(from_light), !lies_here)
                 }
