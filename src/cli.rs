@@ -185,11 +185,15 @@ pub(crate) struct Explain {
 #[derive(Args, Debug)]
 pub(crate) struct ShadowError {
     /// A world (.rhai) or a model (.gltf, .glb)
-    #[arg(required_unless_present = "scene", conflicts_with = "scene")]
+    #[arg(required_unless_present_any = ["scene", "models"], conflicts_with = "scene")]
     pub(crate) path: Option<PathBuf>,
     /// A scene file: models, one light, one camera (JSON)
     #[arg(long)]
     pub(crate) scene: Option<PathBuf>,
+    /// Score every model (.gltf, .glb) in this folder and those in it, each on a floor under a directional light, a spot and a
+    /// point light, and print a table; pictures are then 320x240 unless --size says otherwise
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["path", "scene", "light", "view", "truth", "trace_only", "diff", "penumbra"])]
+    pub(crate) models: Option<PathBuf>,
     /// The light, by name; otherwise the first that casts shadows
     #[arg(long, conflicts_with = "scene")]
     pub(crate) light: Option<String>,
@@ -217,15 +221,18 @@ pub(crate) struct ShadowError {
     pub(crate) truth: Option<PathBuf>,
     /// Score so many places of the eye along a path through the casters and their shadows, and print the worst; pictures are
     /// then 160x120 unless --size says otherwise
-    #[arg(long, value_name = "PLACES", conflicts_with_all = ["truth", "trace_only", "diff", "penumbra"])]
+    #[arg(long, value_name = "PLACES", value_parser = clap::value_parser!(u32).range(1..), conflicts_with_all = ["truth", "trace_only", "penumbra"])]
     pub(crate) eyes: Option<u32>,
+    /// Casters that are cut out by alpha block light with whole triangles in the truth too, as shadow volumes have it
+    #[arg(long)]
+    pub(crate) whole_casters: bool,
     /// Score this mask against the truth instead of rendering: the tracer against another's
     #[arg(long, conflicts_with = "method")]
     pub(crate) trace_only: bool,
     /// Score the penumbra too, against the share of the light's disc that rays see; soft volumes are always scored so
     #[arg(long, conflicts_with = "scene")]
     pub(crate) penumbra: bool,
-    /// Write a picture of the differences: red where a shadow is missing, blue where one is wrong
+    /// Write a picture of the differences: red where a shadow is missing, blue where one is wrong; with --eyes of the worst place
     #[arg(long)]
     pub(crate) diff: Option<PathBuf>,
 }

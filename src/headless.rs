@@ -60,7 +60,7 @@ fn measure(session: &mut Session, args: &Run) -> Result<usize, Failure> {
             let parts = [stepped, stats.prepare_s, stats.encode_s];
             parts_s.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
         }
-        for problem in session.problems().into_iter().chain(renderer.problems()) {
+        for problem in session.problems_with(renderer.problems()) {
             tracing::error!("{problem}");
             problems += 1;
         }
@@ -137,7 +137,7 @@ pub(crate) fn draw(
             bar.set_message(path.display().to_string());
             drawn.last = path;
         }
-        for problem in session.problems().into_iter().chain(renderer.problems()) {
+        for problem in session.problems_with(renderer.problems()) {
             bar.suspend(|| tracing::error!("{problem}"));
             drawn.problems += 1;
         }

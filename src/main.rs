@@ -4,7 +4,6 @@ mod cli;
 #[cfg(feature = "cluster")]
 mod cluster;
 mod doctor;
-mod eye_path;
 mod headless;
 mod model;
 mod nodes;

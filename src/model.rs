@@ -28,8 +28,8 @@ pub(crate) enum Error {
     Fields(#[from] umbriel_fields::Error),
 }
 
-/// Loads the model into the world of `graph` and puts light, ground and camera around it.
-pub(crate) fn show(graph: &mut Graph, path: &Path) -> Result<(), Error> {
+/// Loads the model into the world of `graph` and puts light, ground and camera around it; gives the box around the model.
+pub(crate) fn show(graph: &mut Graph, path: &Path) -> Result<Aabb, Error> {
     let model = gltf::load(graph, path, &LoadOptions::default())?;
     for warning in &model.warnings {
         tracing::warn!("{warning}");
@@ -47,7 +47,8 @@ pub(crate) fn show(graph: &mut Graph, path: &Path) -> Result<(), Error> {
     for light in model.lights.iter().take(SHADOWED_LIGHTS) {
         graph.set_named(*light, "shadows", "map")?;
     }
-    Ok(set_children(graph, world, &children)?)
+    set_children(graph, world, &children)?;
+    Ok(bounds)
 }
 
 fn set_children(graph: &mut Graph, node: NodeId, children: &[NodeId]) -> Result<(), umbriel_fields::Error> {

@@ -337,6 +337,17 @@ impl Session {
     pub(crate) fn problems(&mut self) -> Vec<String> {
         std::mem::take(&mut self.problems)
     }
+
+    /// The same, and those of the renderer. It names what they are about, as in `mesh 'dust' ...`, and does not know where in the
+    /// script that was made.
+    pub(crate) fn problems_with(&mut self, of_renderer: Vec<String>) -> Vec<String> {
+        let mut problems = self.problems();
+        problems.extend(of_renderer.into_iter().map(|problem| {
+            let node = problem.split('\'').nth(1).and_then(|name| self.source.graph().find(name));
+            placed(&self.source, node, &problem)
+        }));
+        problems
+    }
 }
 
 /// A problem with the place in the script where its node was made.

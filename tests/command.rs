@@ -36,7 +36,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
     let truncated = folder("command").join("truncated.glb");
     std::fs::write(&truncated, b"glTF\x02\0\0\0\xff\0\0\0").expect("a file can be written");
     // Name, line of the world, what the message must contain. The rest of the world is drawn.
-    let rows: [(&str, &str, &[&str]); 31] = [
+    let rows: [(&str, &str, &[&str]); 36] = [
         (
             "negative_soft_range",
             r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "volume", soft: "range", soft_range: -1.0 }));"#,
@@ -163,6 +163,31 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
             &["endless_number.rhai:4", "toon", "`bands` is not finite"],
         ),
         (
+            "caster_without_triangles",
+            r#"world.add(shape(make("Mesh", #{ name: "dust", position: [vec3(0,1,0), vec3(1,1,0)], index: [0,1], topology: "lines" }))); world.add(make("DirectionalLight", #{ shadows: "volume" }));"#,
+            &["caster_without_triangles.rhai:4", "mesh 'dust' casts no shadow volume: none of its 0 triangles", "`cast_shadow`"],
+        ),
+        (
+            "vertex_that_is_no_number",
+            r#"world.add(shape(make("Mesh", #{ name: "torn", position: [vec3(0,1,0), vec3(1,1,0), vec3(0.0/0.0,1,1)] }))); world.add(make("DirectionalLight", #{ shadows: "volume" }));"#,
+            &["vertex_that_is_no_number.rhai:4", "Mesh 'torn', geometry", "position 2 is not finite"],
+        ),
+        (
+            "film_that_is_none",
+            r#"let sun = make("DirectionalLight"); world.add(sun); world.add(make("StencilShadow", #{ name: "group", light: sun, mode: "modulative", caster: [shape(make("Box"))], shadow_quad: make("Group", #{ name: "quad" }) }));"#,
+            &["film_that_is_none.rhai:4", "StencilShadow 'group', shadow_quad: 'quad' is no ShadowQuad; the film is black"],
+        ),
+        (
+            "light_that_is_none",
+            r#"world.add(make("DirectionalLight")); world.add(make("StencilShadow", #{ name: "group", light: make("Group", #{ name: "lamp" }), caster: [shape(make("Box"))] }));"#,
+            &["light_that_is_none.rhai:4", "StencilShadow 'group', light: 'lamp' is no light of this world; no shadow"],
+        ),
+        (
+            "volume_of_negative_length",
+            r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "volume", volume_length: -2.0 }));"#,
+            &["volume_of_negative_length.rhai:4:11", "DirectionalLight 'sun', volume_length: -2.0 makes no sense here"],
+        ),
+        (
             "lightless_stencil",
             r#"world.add(make("StencilShadow", #{ name: "group", caster: [shape(make("Box"))] }));"#,
             &["lightless_stencil.rhai:4", "group", "light"],
@@ -186,7 +211,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
 
 #[test]
 fn a_wrong_world_ends_with_a_message() {
-    let rows: [(&str, &str, &[&str]); 8] = [
+    let rows: [(&str, &str, &[&str]); 10] = [
         (
             "latitude_100",
             "let a = 1;\nlet sky = make(\"Ephemeris\", #{ latitude: 100.0 });",
@@ -202,6 +227,16 @@ fn a_wrong_world_ends_with_a_message() {
             "wrong_type",
             "let b = make(\"SpotLight\");\nb.intensity = \"bright\";",
             &["wrong_type.rhai:2", "intensity", "SpotLight"],
+        ),
+        (
+            "film_too_dense",
+            "let q = make(\"ShadowQuad\", #{ name: \"film\" });\nq.alpha = 1.5;",
+            &["film_too_dense.rhai:2:", "`film.alpha` takes values from 0 to 1; 1.5 is outside", "ShadowQuad"],
+        ),
+        (
+            "negative_error",
+            "let c = make(\"ReducedCaster\", #{ name: \"few\" });\nc.max_error = -1.0;",
+            &["negative_error.rhai:2:", "`few.max_error` takes values from 0 to inf; -1 is outside"],
         ),
         ("wrong_choice", "let b = make(\"SpotLight\");\nb.shadows = \"volumes\";", &["wrong_choice.rhai:2", "volumes", "volume"]),
         ("syntax", "let a = ;", &["syntax.rhai:1"]),

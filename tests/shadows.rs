@@ -42,6 +42,21 @@ fn volumes_agree_with_the_truth() {
     town_square(&["--method", "volume"], 0.02, 0.99);
 }
 
+/// Places of the eye in and around volumes, and models on a floor under a light of each kind.
+#[test]
+fn volumes_agree_from_many_places() {
+    let Some(samples) = samples() else { return };
+    let path = |under: &str| samples.join(under).to_str().expect("paths are text").to_owned();
+    let scene = path("worlds/scenes/town_square__sun__eye_level.json");
+    for args in [&["--scene", &scene, "--eyes", "12"][..], &["--models", &path("ships"), "--eyes", "4"]] {
+        let found = scored(args);
+        assert!(found.0 <= 0.02 && found.1 >= 0.99, "{args:?}: {found:?}");
+    }
+    let table = umbriel(&["shadow-error", "--models", &path("ships"), "--size", "80x60"]).stdout;
+    let rows = |light: &str| table.lines().filter(|l| l.starts_with("| ") && l.contains(light)).count();
+    assert_eq!(["| directional |", "| spot |", "| point |"].map(rows), [2; 3], "{table}");
+}
+
 #[test]
 fn maps_agree_with_the_truth() {
     town_square(&["--method", "map", "--map-size", "2048"], 0.5, 0.95);

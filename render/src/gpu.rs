@@ -65,7 +65,7 @@ impl Gpu {
         let info = adapter.get_info();
         let missing = Gpu::required_features() - device.features();
         if !missing.is_empty() {
-            return Err(Error::Lacks { device: info.name, what: format!("{missing:?}") });
+            return Err(lacks(info.name, missing));
         }
         let reports = Arc::new(Mutex::new(Vec::new()));
         let sink = reports.clone();
@@ -83,6 +83,11 @@ impl Gpu {
     }
 }
 
+fn lacks(device: String, missing: wgpu::Features) -> Error {
+    let names: Vec<&str> = missing.iter_names().map(|(name, _)| name).collect();
+    Error::Lacks { device, what: format!("{} (a stencil beside depth of 32 bits)", names.join(", ")) }
+}
+
 fn rank(kind: wgpu::DeviceType) -> u32 {
     match kind {
         wgpu::DeviceType::DiscreteGpu => 0,
@@ -97,7 +102,7 @@ fn open(instance: &wgpu::Instance, adapter: wgpu::Adapter) -> Result<Gpu, Error>
     let info = adapter.get_info();
     let missing = Gpu::required_features() - adapter.features();
     if !missing.is_empty() {
-        return Err(Error::Lacks { device: info.name, what: format!("{missing:?}") });
+        return Err(lacks(info.name, missing));
     }
     // Software waits for all of a pass to read its clock, which takes a part of the frame.
     let clock = if info.device_type == wgpu::DeviceType::Cpu { wgpu::Features::empty() } else { wgpu::Features::TIMESTAMP_QUERY };

@@ -23,6 +23,9 @@ struct Contour {
 
 // Lines lie on the surface whose edges they are: so much nearer, as a share of the distance.
 const NEARER = 5e-4;
+// Strokes lean towards the eye, away from their edge, as ground does that the eye sees at 14 degrees: else the ground that a
+// shape stands on would hide the stroke along its foot. Cotangent of that angle.
+const LEAN = 4.0;
 const NOWHERE = vec4<f32>(2.0, 2.0, 0.5, 1.0);
 
 fn corner_in_world(i: u32) -> vec3<f32> {
@@ -60,7 +63,15 @@ fn is_contour(e: vec4<u32>) -> bool {
     return dot(a, b) < contour.crease_cos * length(a) * length(b);
 }
 
-fn pulled(vertex: u32, edge: u32, half_px: f32) -> vec4<f32> {
+// How much nearer a stroke is at so many pixels from its edge, as a share of the distance.
+fn leaning(px: f32) -> f32 {
+    let clip_from_world = transpose(view.clip_from_world);
+    let rad_per_px = 2.0 / (length(clip_from_world[1].xyz) * view.window.w);
+    return LEAN * px * rad_per_px;
+}
+
+// A corner of a quad along the edge: at its end or its beginning, and `away_px` pixels aside. The ends are `half_px` beyond.
+fn pulled(edge: u32, is_end: bool, away_px: f32, half_px: f32, nearer: f32) -> vec4<f32> {
     let e = edges[edge];
     if half_px <= 0.0 || !is_contour(e) {
         return NOWHERE;
@@ -82,24 +93,38 @@ fn pulled(vertex: u32, edge: u32, half_px: f32) -> vec4<f32> {
     let way = (q.xy / q.w - p.xy / p.w) * pixels;
     let along = select(vec2<f32>(1.0, 0.0), normalize(way), dot(way, way) > 1e-12);
     // Square ends, so that lines join.
-    let is_q = vertex == 1u || vertex == 2u || vertex == 4u;
-    let side = select(-1.0, 1.0, vertex == 2u || vertex > 3u);
-    let offset = vec2<f32>(-along.y, along.x) * side + along * select(-1.0, 1.0, is_q);
-    let at = select(p, q, is_q);
+    let beyond_px = select(-half_px, half_px, is_end);
+    let offset_px = vec2<f32>(-along.y, along.x) * away_px + along * beyond_px;
+    let at = select(p, q, is_end);
     // Depth goes on beyond the ends as between them, where it is linear over the picture.
     let depth_per_px = (q.z / q.w - p.z / p.w) / max(length(way), 1.0);
-    let depth = at.z / at.w + depth_per_px * half_px * select(-1.0, 1.0, is_q);
-    return vec4<f32>(at.xy + offset * half_px / pixels * at.w, clamp(depth * (1.0 + NEARER), 0.0, 1.0) * at.w, at.w);
+    let depth = (at.z / at.w + depth_per_px * beyond_px) * (1.0 + nearer);
+    return vec4<f32>(at.xy + offset_px / pixels * at.w, clamp(depth, 0.0, 1.0) * at.w, at.w);
+}
+
+// Corners of a quad in two triangles: at its end, and on its second side.
+fn at_end(corner: u32) -> bool {
+    return corner == 1u || corner == 2u || corner == 4u;
+}
+
+fn on_second_side(corner: u32) -> bool {
+    return corner == 2u || corner > 3u;
 }
 
 @vertex
-fn line(@builtin(vertex_index) vertex: u32, @builtin(instance_index) edge: u32) -> @builtin(position) vec4<f32> {
-    return pulled(vertex, edge, contour.line_px);
+fn line(@builtin(vertex_index) corner: u32, @builtin(instance_index) edge: u32) -> @builtin(position) vec4<f32> {
+    let half_px = contour.line_px;
+    return pulled(edge, at_end(corner), select(-half_px, half_px, on_second_side(corner)), half_px, NEARER);
 }
 
+// Two quads, one on each side of the edge.
 @vertex
 fn outline(@builtin(vertex_index) vertex: u32, @builtin(instance_index) edge: u32) -> @builtin(position) vec4<f32> {
-    return pulled(vertex, edge, contour.outline_px);
+    let half_px = contour.outline_px;
+    let corner = vertex % 6u;
+    let side = select(-1.0, 1.0, vertex > 5u);
+    let away_px = select(0.0, side * half_px, on_second_side(corner));
+    return pulled(edge, at_end(corner), away_px, half_px, NEARER + leaning(abs(away_px)));
 }
 
 @fragment

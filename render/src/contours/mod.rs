@@ -168,13 +168,15 @@ impl Contours {
                 mark(pass, draw);
             }
             pass.set_bind_group(0, view, &[]);
-            for (pipeline, width) in [(&self.lines, shape.style.line_px), (&self.outlines, shape.style.outline_px)] {
+            let lines = (&self.lines, shape.style.line_px, 6);
+            let outlines = (&self.outlines, shape.style.outline_px, 12);
+            for (pipeline, width, corners) in [lines, outlines] {
                 if width > 0.0 {
                     pass.set_pipeline(pipeline);
                     pass.set_bind_group(2, self.uniforms.group(shape.slot), &[]);
                     for (edges, group) in &shape.parts {
                         pass.set_bind_group(1, group, &[]);
-                        pass.draw(0..6, 0..*edges);
+                        pass.draw(0..corners, 0..*edges);
                     }
                 }
             }

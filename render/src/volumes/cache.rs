@@ -61,7 +61,9 @@ fn problem_of(device: &wgpu::Device, mesh: &Mesh, parts: &[Part]) -> Option<Stri
     let layers = parts.iter().map(|p| p.layers).max().unwrap_or(0);
     if parts.is_empty() {
         let count = mesh.triangle_count();
-        return Some(format!("casts no shadow volume: none of its {count} triangles has three places of its own"));
+        return Some(format!(
+            "casts no shadow volume: none of its {count} triangles has three places of its own (field `cast_shadow` of its shape)"
+        ));
     }
     if parts.iter().any(|p| p.largest_list() > limit) {
         return Some(format!("casts no shadow volume: its edges do not fit into a buffer of {limit} bytes"));

@@ -62,6 +62,70 @@ fn lines_lie_where_they_should() {
     }
 }
 
+/// How much of a pixel is ink, 0 to 1: everything else in these pictures is as green as red.
+fn ink(shot: &Shot, x: u32, y: u32) -> f32 {
+    let linear = |byte: u8| (f32::from(byte) / 255.0 + 0.055).powf(2.4) / 1.055f32.powf(2.4);
+    let [red, green, _, _] = shot.pixel(x, y);
+    linear(red) - linear(green)
+}
+
+/// Runs of ink along a row or a column of pixels: the middle and the width of each, pixels.
+fn strokes(along: impl Iterator<Item = f32>) -> Vec<(f32, f32)> {
+    let inked: Vec<(f32, f32)> = along.enumerate().map(|(i, ink)| (i as f32 + 0.5, ink)).filter(|(_, ink)| *ink > 0.05).collect();
+    let width = |run: &[(f32, f32)]| run.iter().map(|(_, ink)| ink).sum::<f32>();
+    let middle = |run: &[(f32, f32)]| run.iter().map(|(at, ink)| at * ink).sum::<f32>() / width(run);
+    inked.chunk_by(|a, b| b.0 - a.0 < 1.5).map(|run| (middle(run), width(run))).collect()
+}
+
+/// Pixels from the left and the top at which `view` sees a point.
+fn seen_at(view: &View, point: Vec3) -> (f32, f32) {
+    let seen = view.frustum.clip_from_view() * view.view_from_world * point.extend(1.0);
+    let half = |side: u32| 0.5 * side as f32;
+    (half(view.size[0]) * (1.0 + seen.x / seen.w), half(view.size[1]) * (1.0 - seen.y / seen.w))
+}
+
+/// Where strokes and lines lie, to a third of a pixel, and how wide they are: a box whose foot stands on the ground, seen as
+/// a visitor sees it and from above.
+#[test]
+fn lines_are_as_wide_as_they_should_be() {
+    let walked = look("contours_walked", Vec3::new(0.0, 4.0, 9.0), Vec3::Y, [200, 200]);
+    let above = look("contours_straight", Vec3::Y * 10.0, Vec3::ZERO, [200, 200]);
+    let standing =
+        || vec![grey(Vec3::new(4.0, 1.0, 2.0), 0.0, 0.5, 0.0), shape(plane(60.0), matt(0.1, 0.1, 0.1), at(0.0, 0.0, 0.0))];
+    let scene_of = |style, samples| {
+        let mut scene = Scene { samples, ..scene(standing(), style) };
+        scene.contours[0].drawables.truncate(1);
+        scene
+    };
+    let line = ContourStyle { line_px: 3.0, outline_px: 0.0, ..INK };
+    // Name, style, view, across (true: along the row of the middle), points whose pixels bound strokes, and by how many
+    // pixels the middle of the stroke is farther right or down, and its width.
+    type Row<'a> = (&'a str, ContourStyle, &'a View, bool, &'a [(Vec3, f32, f32)]);
+    let (far_top, foot) = (Vec3::new(0.0, 1.0, -1.0), Vec3::new(0.0, 0.0, 1.0));
+    let (left, right) = (Vec3::new(-2.0, 1.0, 0.0), Vec3::new(2.0, 1.0, 0.0));
+    let rows: [Row<'_>; 4] = [
+        ("strokes above and along the foot", INK, &walked, false, &[(far_top, -2.0, 4.0), (foot, 2.0, 4.0)]),
+        ("strokes at both sides", INK, &above, true, &[(left, -2.0, 4.0), (right, 2.0, 4.0)]),
+        ("lines on both sides", line, &above, true, &[(left, 0.0, 3.0), (right, 0.0, 3.0)]),
+        ("narrow strokes", ContourStyle { outline_px: 1.0, ..INK }, &walked, false, &[(far_top, -0.5, 1.0), (foot, 0.5, 1.0)]),
+    ];
+    let mut shooter = Shooter::new();
+    for (name, style, view, across, expected) in rows {
+        for (samples, tolerance) in [(Samples::Four, 0.34), (Samples::One, 0.76)] {
+            let shot = shooter.shoot(&scene_of(style, samples), &Picture::mono(view.clone()));
+            let found = strokes((0..200).map(|i| if across { ink(&shot, i, 100) } else { ink(&shot, 100, i) }));
+            println!("{name}: {found:?}");
+            assert_eq!(found.len(), expected.len(), "{name}, {samples:?}: {found:?}");
+            for ((point, beside, wide), (middle, width)) in expected.iter().zip(found) {
+                let (x, y) = seen_at(view, *point);
+                let off = middle - if across { x } else { y } - beside;
+                assert!(off.abs() <= tolerance, "{name}, {samples:?}: the middle at {middle} is {off} pixels off");
+                assert!((width - wide).abs() <= tolerance, "{name}, {samples:?}: {width} pixels wide instead of {wide}");
+            }
+        }
+    }
+}
+
 /// More shapes than the stencil has numbers: 0 and 255 are the same, and yet each has its stroke. A light by volume counts in
 /// the same stencil before.
 #[test]

@@ -4,6 +4,7 @@ mod author;
 mod contact;
 mod contours;
 mod deformation;
+mod device;
 mod layouts;
 mod lights;
 mod maps;

@@ -2,7 +2,7 @@
 
 use super::instance::{Instance, Instances};
 use super::problem::Problems;
-use super::read::{Reader, label};
+use super::read::{Reader, label, type_name};
 use super::role::Role;
 use glam::Vec3;
 use std::collections::HashSet;
@@ -41,7 +41,7 @@ pub(super) fn read_groups(
             name: label(graph, instance.node),
             light,
             casters: casters(&read, instances, *place, scene),
-            mode: if read.choice("mode") == 1 { StencilMode::Modulative(film(&read)) } else { StencilMode::Additive },
+            mode: if read.choice("mode") == 1 { StencilMode::Modulative(film(&read, problems)) } else { StencilMode::Additive },
         });
     }
     groups
@@ -73,10 +73,22 @@ fn caster_of(instance: &Instance, scene: &Scene) -> Option<usize> {
     if drawable.casts_shadow { Some(slot) } else { stand_in() }
 }
 
-fn film(stencil: &Reader<'_>) -> Film {
-    let Some(quad) = stencil.node("shadow_quad") else { return Film::default() };
-    let read = Reader::new(stencil.graph, quad);
-    let color: Vec3 = read.color("color");
-    let film = color.extend(read.get::<f32>("alpha").clamp(0.0, 1.0));
-    if film.is_finite() { Film { color: film } } else { Film::default() }
+/// The film of the node's quad; black at alpha 0.5 where it has none.
+fn film(stencil: &Reader<'_>, problems: &mut Problems) -> Film {
+    let (film, problem) = match stencil.node("shadow_quad") {
+        None => (None, None),
+        Some(quad) if type_name(stencil.graph, quad) != "ShadowQuad" => {
+            (None, Some(format!("'{}' is no ShadowQuad", label(stencil.graph, quad))))
+        }
+        Some(quad) => {
+            let read = Reader::new(stencil.graph, quad);
+            let color: Vec3 = read.color("color");
+            let film = color.extend(read.get::<f32>("alpha").clamp(0.0, 1.0));
+            let problem = format!("the color of '{}' is not finite", label(stencil.graph, quad));
+            if film.is_finite() { (Some(Film { color: film }), None) } else { (None, Some(problem)) }
+        }
+    };
+    let problem = problem.map(|what| format!("{what}; the film is black at alpha 0.5"));
+    problems.set(stencil.graph, stencil.node, "shadow_quad", problem);
+    film.unwrap_or_default()
 }

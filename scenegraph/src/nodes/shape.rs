@@ -24,11 +24,13 @@ pub(super) fn types() -> Vec<NodeType> {
         .field(
             Field::new("max_error", 0.0f32)
                 .unit("m")
+                .range(0.0, f64::INFINITY)
                 .doc("How far what is made may be from what is shown; 0: a hundredth of its size."),
         )
         .field(
             Field::new("angle", 0.0f32)
                 .unit("rad")
+                .range(0.0, std::f64::consts::PI)
                 .doc("Used where the user's head sees the error under less than this; 0: always."),
         ),
         NodeType::new("Appearance", "How a shape looks.")

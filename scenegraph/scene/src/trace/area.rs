@@ -4,7 +4,6 @@ use super::camera::Camera;
 use super::ray::Ray;
 use super::{Beam, Mask, TraceError, TraceOptions, Tracer};
 use crate::{Light, View};
-use glam::DVec3;
 
 /// Rays that decide whether the others are needed.
 const FIRST_RAYS: usize = 24;
@@ -41,8 +40,8 @@ impl Tracer {
         let mut shares = vec![None; width as usize * height as usize];
         super::by_rows(&mut shares, width, progress, |pixel| {
             let mut sum = (0.0, 0.0);
-            for direction in camera.directions(pixel) {
-                sum = (sum.0 + self.share(camera.eye, direction, &beam, options, &disc)?, sum.1 + 1.0);
+            for ray in camera.rays(pixel) {
+                sum = (sum.0 + self.share(&ray, &beam, options, &disc)?, sum.1 + 1.0);
             }
             Some((sum.0 / sum.1) as f32)
         });
@@ -50,15 +49,8 @@ impl Tracer {
     }
 
     /// The share of the disc that is seen from where a ray ends.
-    pub(super) fn share(
-        &self,
-        eye: DVec3,
-        direction: DVec3,
-        beam: &Beam,
-        options: &TraceOptions,
-        disc: &[(f64, f64)],
-    ) -> Option<f64> {
-        let place = self.place(eye, direction, beam, options)?;
+    pub(super) fn share(&self, ray: &Ray, beam: &Beam, options: &TraceOptions, disc: &[(f64, f64)]) -> Option<f64> {
+        let place = self.place(ray, beam, options)?;
         match place.class {
             Mask::LIT if !place.receives => return Some(1.0),
             Mask::LIT => (),
@@ -72,7 +64,7 @@ impl Tracer {
                 false => (place.to_light + offset, f64::INFINITY),
             };
             let ray = Ray::new(place.start, to.normalize());
-            !self.is_blocked(&ray, far - 2.0 * place.eps, options.blend_casts)
+            !self.is_blocked(&ray, far - 2.0 * place.eps, options)
         };
         let step = disc.len() / FIRST_RAYS;
         let first = disc.iter().step_by(step).filter(|s| is_seen(s)).count();

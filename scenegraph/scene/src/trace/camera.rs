@@ -1,12 +1,15 @@
 //! The rays of a view.
 
 use super::TraceError;
+use super::ray::Ray;
 use crate::View;
 use glam::{DMat4, DVec3};
 
 /// An eye and its window, in double precision.
 pub(super) struct Camera {
     pub(super) eye: DVec3,
+    /// Distance of the near plane, metres.
+    near: f64,
     world_from_view: DMat4,
     /// Left and top of the window at distance 1, and its width and (negative) height.
     corner: [f64; 2],
@@ -27,11 +30,11 @@ impl Camera {
             return Err(TraceError::BadView { view: view.name.clone() });
         }
         let eye = world_from_view.transform_point3(DVec3::ZERO);
-        Ok(Camera { eye, world_from_view, corner, span, size: view.size, sub_samples })
+        Ok(Camera { eye, near, world_from_view, corner, span, size: view.size, sub_samples })
     }
 
-    /// Unit vectors through the centres of a pixel's sub-pixels.
-    pub(super) fn directions(&self, [x, y]: [u32; 2]) -> impl Iterator<Item = DVec3> + '_ {
+    /// Rays through the centres of a pixel's sub-pixels. They start at the near plane: what is nearer is not seen.
+    pub(super) fn rays(&self, [x, y]: [u32; 2]) -> impl Iterator<Item = Ray> + '_ {
         let n = self.sub_samples;
         let along = move |pixel: u32, sub: u32, axis: usize| {
             let share = (f64::from(pixel) + (f64::from(sub) + 0.5) / f64::from(n)) / f64::from(self.size[axis]);
@@ -40,7 +43,8 @@ impl Camera {
         (0..n).flat_map(move |sub_y| {
             (0..n).map(move |sub_x| {
                 let in_view = DVec3::new(along(x, sub_x, 0), along(y, sub_y, 1), -1.0);
-                self.world_from_view.transform_vector3(in_view).normalize()
+                let ahead = self.world_from_view.transform_vector3(in_view);
+                Ray::new(self.eye + ahead * self.near, ahead.normalize())
             })
         })
     }
@@ -66,10 +70,12 @@ mod tests {
         for (sub_samples, pixel, expected) in rows {
             let camera = Camera::new(&view, sub_samples).unwrap();
             assert_eq!(camera.eye, DVec3::new(1.0, 2.0, 3.0));
-            let found: Vec<DVec3> = camera.directions(pixel).collect();
+            let found: Vec<Ray> = camera.rays(pixel).collect();
             assert_eq!(found.len(), expected.len());
             for (found, (x, y)) in found.iter().zip(expected) {
-                assert!(found.abs_diff_eq(DVec3::new(x, y, -1.0).normalize(), 1e-12), "{pixel:?}: {found} {x} {y}");
+                let ahead = DVec3::new(x, y, -1.0);
+                assert!(found.direction.abs_diff_eq(ahead.normalize(), 1e-12), "{pixel:?}: {found:?} {x} {y}");
+                assert!(found.origin.abs_diff_eq(camera.eye + 2.0 * ahead, 1e-12), "{pixel:?}: {found:?} {x} {y}");
             }
         }
     }

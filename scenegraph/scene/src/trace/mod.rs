@@ -36,11 +36,13 @@ pub struct TraceOptions {
     pub cull: bool,
     /// Surfaces with alpha mode blend, which the eye does not see here, cast shadows.
     pub blend_casts: bool,
+    /// Casters that are cut out by alpha block light with the whole of their triangles, as shadow volumes have it.
+    pub whole_casters: bool,
 }
 
 impl Default for TraceOptions {
     fn default() -> TraceOptions {
-        TraceOptions { sub_samples: 4, graze: 0.03, eps_scale: 1e-5, cull: true, blend_casts: true }
+        TraceOptions { sub_samples: 4, graze: 0.03, eps_scale: 1e-5, cull: true, blend_casts: true, whole_casters: false }
     }
 }
 
@@ -96,8 +98,8 @@ impl Tracer {
         self.soup.triangles.len()
     }
 
-    /// Traces what `light` does in each pixel of `view`, on all cores. Rays start at the eye, in front of the near plane
-    /// too. Attenuation of the light does not count, its range does: what lies beyond is outside. A shape that receives
+    /// Traces what `light` does in each pixel of `view`, on all cores. What is nearer than the near plane is not seen.
+    /// Attenuation of the light does not count, its range does: what lies beyond is outside. A shape that receives
     /// no shadows is lit where it faces the light. `progress` hears the number of rows that are done, from any thread.
     pub fn visibility(
         &self,
@@ -116,30 +118,31 @@ impl Tracer {
 
     /// The class of a pixel: that of all its rays, or mixed.
     fn pixel(&self, camera: &Camera, pixel: [u32; 2], beam: &Beam, options: &TraceOptions) -> u8 {
-        let mut classes = camera.directions(pixel).map(|direction| self.classify(camera.eye, direction, beam, options));
+        let mut classes = camera.rays(pixel).map(|ray| self.classify(&ray, beam, options));
         let first = classes.next().unwrap_or(Mask::BACKGROUND);
         if classes.all(|class| class == first) { first } else { Mask::MIXED }
     }
 
-    /// The class of what a ray from `eye` along the unit vector `direction` meets.
-    fn classify(&self, eye: DVec3, direction: DVec3, beam: &Beam, options: &TraceOptions) -> u8 {
-        let Some(place) = self.place(eye, direction, beam, options) else { return Mask::BACKGROUND };
+    /// The class of what a ray of the eye meets.
+    fn classify(&self, ray: &Ray, beam: &Beam, options: &TraceOptions) -> u8 {
+        let Some(place) = self.place(ray, beam, options) else { return Mask::BACKGROUND };
         let may_be_dark = place.class == Mask::LIT && place.receives;
         let shadow = Ray::new(place.start, place.to_light);
-        if may_be_dark && self.is_blocked(&shadow, place.far - 2.0 * place.eps, options.blend_casts) {
+        if may_be_dark && self.is_blocked(&shadow, place.far - 2.0 * place.eps, options) {
             return Mask::SHADOW;
         }
         place.class
     }
 
-    /// What a ray from `eye` along the unit vector `direction` meets, as if nothing cast shadows.
-    fn place(&self, eye: DVec3, direction: DVec3, beam: &Beam, options: &TraceOptions) -> Option<Place> {
-        let hit = self.first_seen(&Ray::new(eye, direction), options.cull)?;
+    /// What a ray of the eye meets, as if nothing cast shadows.
+    fn place(&self, ray: &Ray, beam: &Beam, options: &TraceOptions) -> Option<Place> {
+        let Ray { origin, direction } = *ray;
+        let hit = self.first_seen(ray, options.cull)?;
         let triangle = &self.soup.triangles[hit.triangle];
         let normal = triangle.normal();
         // Once more against the plane: the hit's own distance comes from barycentrics.
-        let distance = (triangle.corners[0] - eye).dot(normal) / normal.dot(direction);
-        let point = eye + direction * distance;
+        let distance = (triangle.corners[0] - origin).dot(normal) / normal.dot(direction);
+        let point = origin + direction * distance;
         let facing = if normal.dot(direction) > 0.0 { -normal } else { normal };
         let (to_light, far) = beam.to_light(point, facing);
         let class = if beam.misses(to_light, far) {
@@ -163,10 +166,10 @@ impl Tracer {
     }
 
     /// Is there a caster on the ray before the distance `far`?
-    fn is_blocked(&self, ray: &Ray, far: f64, blend_casts: bool) -> bool {
+    fn is_blocked(&self, ray: &Ray, far: f64, options: &TraceOptions) -> bool {
         self.soup.any(ray, far, |hit| {
             let shape = &self.soup.shapes[self.soup.triangles[hit.triangle].shape as usize];
-            shape.casts && (blend_casts || !shape.blend) && self.soup.is_there(hit)
+            shape.casts && (options.blend_casts || !shape.blend) && (options.whole_casters || self.soup.is_there(hit))
         })
     }
 }

@@ -13,7 +13,7 @@ fn scene(drawables: Vec<Drawable>) -> Scene {
 /// What the light does at the point where a ray from `eye` towards `target` ends.
 fn class(scene: &Scene, light: &Light, eye: Vec3, target: Vec3, options: &TraceOptions) -> u8 {
     let direction = (target - eye).as_dvec3().normalize();
-    Tracer::new(scene).classify(eye.as_dvec3(), direction, &Beam::new(light).unwrap(), options)
+    Tracer::new(scene).classify(&Ray::new(eye.as_dvec3(), direction), &Beam::new(light).unwrap(), options)
 }
 
 fn check(name: &str, scene: &Scene, light: &Light, rows: &[(Vec3, Vec3, u8)]) {
@@ -96,7 +96,7 @@ fn shadow_of_a_sphere_is_the_cone_through_its_circle() {
     let distance = |from: DVec3, along: DVec3| (centre.as_dvec3() - from).cross(along).length();
     let (mut compared, mut shadowed) = (0, 0);
     for (pixel, class) in (0..240 * 180).zip(&mask.classes) {
-        let direction = camera.directions([pixel % 240, pixel / 240]).next().unwrap();
+        let direction = camera.rays([pixel % 240, pixel / 240]).next().unwrap().direction;
         let at_ground = camera.eye - direction * (camera.eye.y / direction.y);
         let to_light = (light.as_dvec3() - at_ground).normalize();
         let (seen_past, lit_past) = (distance(camera.eye, direction), distance(at_ground, to_light));
@@ -215,6 +215,14 @@ fn alpha_masks_have_holes_for_the_eye_and_for_light() {
             (vec3(1.0, 5.0, 0.0), vec3(-0.1, 0.0, 0.0), SHADOW),
         ],
     );
+    let whole = TraceOptions { whole_casters: true, ..TraceOptions::default() };
+    let masked_scene = scene(vec![ground(10.0), masked(Mat4::IDENTITY)]);
+    // The eye sees through the hole all the same.
+    let through = (vec3(1.0, 5.0, 0.0), vec3(0.1, 0.0, 0.0));
+    assert_eq!(
+        [(under, left), (under, right), through].map(|(eye, to)| class(&masked_scene, &light, eye, to, &whole)),
+        [SHADOW; 3]
+    );
     check(
         "mirrored mask",
         &scene(vec![ground(10.0), masked(Mat4::from_scale(vec3(-1.0, 1.0, 1.0)))]),
@@ -255,6 +263,23 @@ fn light_and_eye_inside_of_a_caster() {
         &[(inside, vec3(2.5, 0.0, 0.3), SHADOW), (inside, vec3(4.0, 0.0, 0.3), LIT)],
     );
     check("light behind the caster only", &closed, &lamp(vec3(0.0, 0.5, 4.0)), &[(eye, vec3(0.0, 0.0, 5.0), LIT)]);
+}
+
+/// A sheet half a metre before the eye, which a near plane beyond it cuts away. It casts all the same.
+#[test]
+fn what_is_nearer_than_the_near_plane_is_not_seen() {
+    let sheet = with(drawable(square(), Mat4::from_translation(vec3(0.0, 3.5, 0.0))), |_, m| m.double_sided = true);
+    let tracer = Tracer::new(&scene(vec![ground(10.0), sheet]));
+    let above = view(vec3(0.0, 4.0, 0.01), Vec3::ZERO, [1, 1]);
+    let window = above.frustum;
+    for (near, expected) in [(0.1, LIT), (1.0, SHADOW)] {
+        let scaled = |edge: f32| edge / window.near * near;
+        let [left, right, bottom, top] = [window.left, window.right, window.bottom, window.top].map(scaled);
+        let view = View { frustum: Frustum { left, right, bottom, top, near }, ..above.clone() };
+        let options = TraceOptions { sub_samples: 1, ..TraceOptions::default() };
+        let mask = tracer.visibility(&sun(Vec3::NEG_Y), &view, &options, &|_| ()).unwrap();
+        assert_eq!(mask.classes, [expected], "near plane at {near} m");
+    }
 }
 
 #[test]
@@ -352,7 +377,7 @@ fn a_straight_edge_hides_the_segment_of_the_disc() {
         let disc = super::area::disc(f64::from(light.size), 4096);
         for x in [-1.5f64, -1.0, -0.7, -0.2, 0.0, 0.4, 0.9, 1.1] {
             let (eye, target) = (dvec3(-9.0, 3.0, 0.0), dvec3(x * radius, 0.0, 0.0));
-            let found = tracer.share(eye, (target - eye).normalize(), &beam, &TraceOptions::default(), &disc).unwrap();
+            let found = tracer.share(&Ray::new(eye, (target - eye).normalize()), &beam, &TraceOptions::default(), &disc).unwrap();
             let cut = x.clamp(-1.0, 1.0);
             let expected = (cut.acos() - cut * (1.0 - cut * cut).sqrt()) / std::f64::consts::PI;
             assert!((found - expected).abs() < 0.01, "{name} {x}: {found} instead of {expected}");

@@ -1,7 +1,10 @@
 //! Scores the shadows of one light against ray-traced ones (S13).
 
+mod eye_path;
+mod models;
+mod worst;
+
 use crate::cli::{Method, ShadowError};
-use crate::eye_path;
 use crate::headless::{describe, progress};
 use crate::png;
 use crate::scene_file::{self, SceneFile};
@@ -16,18 +19,21 @@ use umbriel_scene::{
     specks,
 };
 use umbriel_scenegraph::Extractor;
+use worst::Worst;
 
 type Failure = Box<dyn std::error::Error>;
 
 const SIZE: [u32; 2] = [800, 600];
+/// Where shadow rays start, from their surface, as a share of the scene's size.
+const CLOSE: f64 = 1e-7;
 
 /// What is scored.
-pub(crate) struct Subject {
-    pub(crate) scene: Scene,
-    pub(crate) light: usize,
-    pub(crate) view: View,
-    pub(crate) options: TraceOptions,
-    pub(crate) problems: Vec<String>,
+struct Subject {
+    scene: Scene,
+    light: usize,
+    view: View,
+    options: TraceOptions,
+    problems: Vec<String>,
 }
 
 impl Subject {
@@ -44,6 +50,9 @@ impl Subject {
 
 /// Renders, traces, and prints the score; gives the number of problems that were reported.
 pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
+    if let Some(folder) = &args.models {
+        return models::run(folder, args);
+    }
     let mut subject = match (&args.scene, &args.path) {
         (Some(file), _) => from_scene_file(&scene_file::read(file)?, file, args)?,
         (None, Some(path)) => from_world(path, args)?,
@@ -60,13 +69,28 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
         return Err(format!("{shown}: it casts no shadows; choose a --method").into());
     }
 
+    subject.options.whole_casters = args.whole_casters;
+
     if let Some(places) = args.eyes {
+        // The eye comes as close as the near plane, where what rays start off their surfaces would be pixels.
+        subject.options.eps_scale = subject.options.eps_scale.min(CLOSE);
         if args.size.is_none() {
             subject.view.size = eye_path::SIZE;
         }
         println!("{shown}, {places} places, {}x{}", subject.view.size[0], subject.view.size[1]);
-        println!("{}", eye_path::score(&mut subject, places)?);
-        return Ok(subject.problems.len());
+        let gpu = Gpu::new(None)?;
+        let bar = progress(places, "places");
+        let views = eye_path::path(&subject.scene, &subject.view, places);
+        let found = Worst::of(&mut Renderer::new(&gpu)?, &mut subject, &views, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        for problem in &subject.problems {
+            tracing::error!("{problem}");
+        }
+        println!("{found}");
+        if args.diff.is_none() {
+            return Ok(subject.problems.len());
+        }
+        subject.view = views[found.disagreement.1 as usize].clone();
     }
     let truth = match &args.truth {
         Some(path) => read_mask(path, subject.view.size)?,
@@ -133,8 +157,7 @@ fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
             casting.or(lights.iter().position(|l| l.shines)).ok_or("the world has no light that is on")?
         }
     };
-    // A world may be a kilometre wide, and its lamps stand centimetres from what casts: rays start close to surfaces.
-    let options = TraceOptions { sub_samples: args.sub_samples, eps_scale: 1e-7, ..TraceOptions::default() };
+    let options = world_options(args.sub_samples);
     let problems = session.problems();
     let mut scene = std::mem::take(session.scene_mut());
     // The tracer knows no lists of lights.
@@ -143,6 +166,11 @@ fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
         drawable.receives_shadow &= drawable.receives.is_none_or(lists_it);
     }
     Ok(Subject { scene, light, view, options, problems })
+}
+
+/// A world may be a kilometre wide, and its lamps stand centimetres from what casts: rays start close to surfaces.
+fn world_options(sub_samples: u32) -> TraceOptions {
+    TraceOptions { sub_samples, eps_scale: CLOSE, ..TraceOptions::default() }
 }
 
 /// The models of a scene file, with its light alone.
