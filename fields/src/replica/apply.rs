@@ -2,14 +2,17 @@
 
 use std::collections::{HashMap, HashSet};
 
+use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
+
 use super::bulk::{Bulk, ImageHashes};
+use super::flat::{Flat, FlatBytes, floats_of};
 use super::learn::{Finder, LocalType, NONE, Namer, Nodes, local_type};
 use super::packet::{Head, Packet, Place, places};
 use super::shares::{Shares, field_share, route_share};
 use super::{ReplicaError, damaged};
 use crate::codec::{take_value, to_bytes};
 use crate::graph::slot_of;
-use crate::{Changes, FieldId, Graph, Kind, NodeId, Revision, Strength, TypeRegistry, Value};
+use crate::{Changes, Color, ColorA, FieldId, FieldType, Graph, Kind, NodeId, Revision, Strength, TypeRegistry, Value};
 
 /// A node of the application, here.
 pub(super) struct Held {
@@ -146,9 +149,11 @@ impl Replica {
         self.remove(head)?;
         self.create(head, bulk)?;
         self.connect(head)?;
+        // What was made, and what somebody else wrote since the last frame, is in the hash before values come: those bring it along.
+        self.update_hash();
         self.values(packet, bulk)?;
         (self.frame, self.time_s, self.expected) = (head.frame, head.time_s, head.hash);
-        self.update_hash();
+        self.mark = self.graph.revision();
         self.sweep();
         Ok(())
     }
@@ -255,27 +260,81 @@ impl Replica {
             let bytes = bulk.value(*hash).ok_or(ReplicaError::MissingBulk { count: 1 })?;
             let field = self.place(*place)?;
             let field_type = self.graph.declaration(field).map_err(|error| damaged(error.to_string()))?.field_type;
-            self.value(field, field_type, &mut &bytes[..], bulk)?;
+            self.value(*place, field, field_type, &mut &bytes[..], bulk)?;
         }
         for (field_type, at, bytes) in &packet.groups {
-            let mut rest = *bytes;
-            for (slot, index) in places(at) {
-                let held = self.held.get(slot as usize).and_then(Option::as_ref);
-                let held = held.ok_or_else(|| damaged("it writes to a node that is not there"))?;
-                let field = self.field_of(held, index)?;
-                self.value(field, *field_type, &mut rest, bulk)?;
+            match self.flat_group(*field_type, at, bytes) {
+                Some(done) => done?,
+                None => self.group(*field_type, at, bytes, bulk)?,
             }
-            if !rest.is_empty() {
-                return Err(damaged("values are left over"));
+        }
+        Ok(())
+    }
+
+    fn group(&mut self, field_type: FieldType, at: &[u8], bytes: &[u8], bulk: &Bulk) -> Result<(), ReplicaError> {
+        let mut rest = bytes;
+        for (slot, index) in places(at) {
+            let held = self.held.get(slot as usize).and_then(Option::as_ref);
+            let held = held.ok_or_else(|| damaged("it writes to a node that is not there"))?;
+            let (place, field) = ((held.number, index), self.field_of(held, index)?);
+            self.value(place, field, field_type, &mut rest, bulk)?;
+        }
+        if rest.is_empty() { Ok(()) } else { Err(damaged("values are left over")) }
+    }
+
+    /// A group of values that are floats; None of others.
+    fn flat_group(&mut self, field_type: FieldType, at: &[u8], bytes: &[u8]) -> Option<Result<(), ReplicaError>> {
+        if field_type.multiple {
+            return None;
+        }
+        Some(match field_type.kind {
+            Kind::F32 => self.floats::<f32, 1>(at, bytes),
+            Kind::Vec2 => self.floats::<Vec2, 2>(at, bytes),
+            Kind::Vec3 => self.floats::<Vec3, 3>(at, bytes),
+            Kind::Vec4 => self.floats::<Vec4, 4>(at, bytes),
+            Kind::Quat => self.floats::<Quat, 4>(at, bytes),
+            Kind::Mat4 => self.floats::<Mat4, 16>(at, bytes),
+            Kind::Color => self.floats::<Color, 3>(at, bytes),
+            Kind::ColorA => self.floats::<ColorA, 4>(at, bytes),
+            _ => return None,
+        })
+    }
+
+    fn floats<T: Flat<COUNT>, const COUNT: usize>(&mut self, at: &[u8], bytes: &[u8]) -> Result<(), ReplicaError> {
+        if bytes.len() / (4 * COUNT) != at.len() / 6 || bytes.len() % (4 * COUNT) != 0 {
+            return Err(damaged("it has more places than values, or fewer"));
+        }
+        let Replica { graph, held, types, shares, .. } = self;
+        // Nodes of one type stand together as a rule.
+        let mut last: Option<(u32, &LocalType)> = None;
+        for ((slot, index), bytes) in places(at).zip(bytes.chunks_exact(4 * COUNT)) {
+            let held = held.get(slot as usize).and_then(Option::as_ref);
+            let held = held.ok_or_else(|| damaged("it writes to a node that is not there"))?;
+            let local = match last {
+                Some((number, local)) if number == held.node_type => Some(local),
+                _ => types.get(&held.node_type).inspect(|local| last = Some((held.node_type, local))),
+            };
+            let field = field_here(local, held, index)?;
+            let (declared, place) = graph.place(field).map_err(|error| damaged(error.to_string()))?;
+            if declared.field_type != T::TYPE {
+                return Err(damaged(format!("{} does not hold a {}", graph.describe_field(field), T::TYPE)));
             }
+            let revision = graph.changes.next();
+            let column = T::column_mut(&mut graph.columns);
+            column.write(place, T::of_floats(floats_of(bytes)), false, revision);
+            // What stands there counts, not what was to be written.
+            let stands = FlatBytes::of(column.values[place as usize].floats());
+            graph.changes.wrote(slot_of(field.node), revision);
+            shares.set_field(held.number, index, field_share(held.number, index, stands.as_slice()));
         }
         Ok(())
     }
 
     fn value(
         &mut self,
+        place: Place,
         field: FieldId,
-        field_type: crate::FieldType,
+        field_type: FieldType,
         bytes: &mut &[u8],
         bulk: &Bulk,
     ) -> Result<(), ReplicaError> {
@@ -285,7 +344,12 @@ impl Replica {
         if find.missed > 0 {
             return Err(ReplicaError::MissingBulk { count: find.missed });
         }
-        put(&mut self.graph, field, value)
+        put(&mut self.graph, field, value)?;
+        let (declared, slot) = self.graph.place(field).map_err(|error| damaged(error.to_string()))?;
+        let mut namer = Namer { numbers: &self.nodes.numbers, hashes: &mut self.hashes };
+        let stands = to_bytes(&self.graph.columns.value(field_type, slot), declared, &mut namer, Vec::new());
+        self.shares.set_field(place.0, place.1, field_share(place.0, place.1, &stands));
+        Ok(())
     }
 
     pub(super) fn place(&self, (number, index): Place) -> Result<FieldId, ReplicaError> {
@@ -294,11 +358,7 @@ impl Replica {
     }
 
     fn field_of(&self, held: &Held, index: u16) -> Result<FieldId, ReplicaError> {
-        let declared = self.types.get(&held.node_type).and_then(|local| local.to_local.get(index as usize)).copied();
-        let local = declared.filter(|local| *local != NONE);
-        let dynamic = || held.dynamic.iter().find(|(there, _)| *there == index).map(|(_, here)| *here);
-        let index = local.or_else(dynamic).ok_or_else(|| damaged("it refers to a field that is not there"))?;
-        Ok(FieldId { node: held.id, index })
+        field_here(self.types.get(&held.node_type), held, index)
     }
 
     /// Brings the hash up to date with all that was written to the graph, by packets or by others.
@@ -345,6 +405,14 @@ impl Replica {
         self.nodes.sweep(&referred);
         self.sweep_at = SWEEP.max(2 * self.nodes.dead.len()).max(self.graph.node_count());
     }
+}
+
+/// The field of a node that has an index in the application.
+fn field_here(local: Option<&LocalType>, held: &Held, index: u16) -> Result<FieldId, ReplicaError> {
+    let declared = local.and_then(|local| local.to_local.get(index as usize)).copied().filter(|local| *local != NONE);
+    let dynamic = || held.dynamic.iter().find(|(there, _)| *there == index).map(|(_, here)| *here);
+    let index = declared.or_else(dynamic).ok_or_else(|| damaged("it refers to a field that is not there"))?;
+    Ok(FieldId { node: held.id, index })
 }
 
 /// Writes a value that was right where it came from.

@@ -16,6 +16,7 @@ mod apply;
 mod bulk;
 mod deeds;
 mod difference;
+mod flat;
 mod learn;
 mod local;
 mod mirror;

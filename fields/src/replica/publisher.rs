@@ -6,6 +6,7 @@ use std::sync::Arc;
 use slotmap::Key;
 
 use super::bulk::{ImageHashes, LONG, Offered, hash_of_value, message_of_image, message_of_value};
+use super::flat::flat_bytes;
 use super::packet::{Group, Head, Place, TypeRecord, write};
 use super::routes::KnownRoutes;
 use super::shares::{Shares, field_share};
@@ -282,8 +283,18 @@ impl Publisher {
 
     /// Puts a value into its group, or by its content if it is long.
     fn value(&mut self, graph: &Graph, place: Place, field: &Field, slot: u32, draft: &mut Draft, purpose: Purpose) {
-        let value = graph.columns.value(field.field_type, slot);
         let group = draft.groups.entry(field.field_type).or_default();
+        if let Some(flat) = flat_bytes(&graph.columns, field.field_type, slot) {
+            if purpose != Purpose::Snapshot {
+                self.shares.set_field(place.0, place.1, field_share(place.0, place.1, flat.as_slice()));
+            }
+            if purpose != Purpose::HashOnly {
+                group.bytes.extend_from_slice(flat.as_slice());
+                group.places.push((place.0 as u32, place.1));
+            }
+            return;
+        }
+        let value = graph.columns.value(field.field_type, slot);
         let start = group.bytes.len();
         let mut names = Names { hashes: &mut self.hashes, images: Vec::new() };
         group.bytes = to_bytes(&value, field, &mut names, std::mem::take(&mut group.bytes));
