@@ -143,6 +143,10 @@ pub(crate) fn problem_from(error: &EvalAltResult, source: &Source, known: &dyn K
         EvalAltResult::ErrorTerminated(reason, _) => Fault::new(reason.to_string()),
         EvalAltResult::ErrorFunctionNotFound(signature, _) => Fault::new(known.no_function(signature)),
         EvalAltResult::ErrorVariableNotFound(name, _) => Fault::new(known.no_variable(name)),
+        EvalAltResult::ErrorDataRace(..) => Fault::new(
+            "a function of a node cannot be given a handler that uses the same variable: write `on_change(node, \"field\", handler)` \
+             instead of `node.on_change(\"field\", handler)`",
+        ),
         EvalAltResult::ErrorStackOverflow(_) => Fault::new("functions call each other too deeply"),
         other => Fault::new(text_without_place(other)),
     };

@@ -75,6 +75,7 @@ fn errors() {
             &["test:2:", "size", "crate", "expected a vec3", "whole number 3"],
         ),
         ("let b = make(\"Box\");\nb.size = vec4(1, 2, 3, 4);", &["test:2:", "expected a vec3", "vec4"]),
+        ("let l = make(\"SpotLight\");\nl.on_change(\"on\", |v| l.intensity = 1.0);", &["write `on_change(node"]),
         ("let m = make(\"Mesh\");\nm.index = [0, 1.5];", &["test:2:", "an array of whole number", "number 1.5 as element 1"]),
         ("let m = make(\"Mesh\");\nm.index = [3000000000];", &["test:2:", "does not fit into 32 bits"]),
         ("let l = make(\"SpotLight\");\nl.intensity = 1e300;", &["test:2:", "too large"]),

@@ -6,6 +6,7 @@ use super::screen::{Canvas, InWindow, ScreenError, Sight};
 use super::{Failure, security};
 use crate::cli;
 use crate::window::screenshot;
+use std::io::Write;
 use std::time::{Duration, Instant};
 use umbriel_displays::cluster::{ClusterError, Event, Follower, FollowerOptions, Pointing, Screen};
 use umbriel_displays::navigation::Input;
@@ -26,18 +27,22 @@ pub(crate) fn display(args: &cli::Display) -> Result<usize, Failure> {
         let mut canvas = Canvas::new(&args.show, args.out.as_deref())?;
         // What is corrupted shows in a frame that comes after it.
         let patience = Duration::from_millis(if args.corrupt.is_some() { 1 } else { 50 });
-        std::iter::repeat_with(|| process.turn(&mut canvas, patience))
-            .find(|turn| !matches!(turn, Ok(true)))
-            .map(|turn| turn.map(drop))
+        loop {
+            match process.turn(&mut canvas, patience) {
+                Ok(true) => {}
+                other => break other.map(drop),
+            }
+        }
     } else {
         let options = Options { fullscreen: args.fullscreen, ..Options::default() };
         let mut windowed = Windowed { process, sight: Sight::new(&args.show), ended: false };
         let ended = window::run(&mut windowed, options);
         process = windowed.process;
-        Some(ended)
+        ended
     };
-    println!("{}", summary(&process.follower));
-    ended.unwrap_or(Ok(())).map(|()| 0)
+    // Whoever started it may not listen any more.
+    let _ = writeln!(std::io::stdout(), "{}", summary(&process.follower));
+    ended.map(|()| 0)
 }
 
 /// What both kinds of display do.

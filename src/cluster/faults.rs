@@ -27,7 +27,7 @@ struct Open {
     is_healed: bool,
     /// Was the display out of the lock at all?
     was_out: bool,
-    /// A process that was started again: was the old one given up, and how long did the new one take to join?
+    /// Was its line given up, and how long did the new one take to come?
     was_given_up: bool,
     joined: Option<Duration>,
     /// Frames and disagreements before it.
@@ -125,7 +125,7 @@ impl Plan {
             open.was_out |= !is_live;
             let is_known = host.knows(&open.fault.display);
             open.was_given_up |= !is_known;
-            if open.fault.kind == FaultKind::Kill && open.was_given_up && is_known {
+            if open.is_healed && open.was_given_up && is_known {
                 open.joined.get_or_insert(open.heals.elapsed());
             }
         }
@@ -173,7 +173,7 @@ fn outcome(open: &Open, host: &Host, is_back: bool) -> String {
         (true, false, _) => "never out of the lock".into(),
         (true, true, None) => format!("back after {took_ms:.0} ms"),
         (true, true, Some(joined)) => {
-            format!("back after {took_ms:.0} ms, of which {:.0} ms until the process joined", joined.as_secs_f64() * 1e3)
+            format!("back after {took_ms:.0} ms, of which {:.0} ms until it joined", joined.as_secs_f64() * 1e3)
         }
     };
     let disagreed = host.report().disagreed - open.disagreed;

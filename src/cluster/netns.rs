@@ -73,7 +73,12 @@ impl Namespace {
         command
     }
 
-    /// Of 1000 packets each way, so many are lost.
+    /// No packet goes through.
+    pub(super) fn cut(&self) -> Result<(), Failure> {
+        ["input", "output"].iter().try_for_each(|way| self.ran("nft", &[&format!("add rule inet umbriel {way} drop")]))
+    }
+
+    /// Of 1000 packets each way, so many are lost; less than 1000.
     pub(super) fn lose(&self, of_1000: u32) -> Result<(), Failure> {
         for way in ["input", "output"] {
             self.ran("nft", &[&format!("add rule inet umbriel {way} numgen random mod 1000 < {of_1000} drop")])?;

@@ -67,7 +67,7 @@ impl Wire {
             (Wire::Proxy(proxy), FaultKind::Partition) => proxy.cut(Duration::MAX),
             (Wire::Namespace(namespace, _), FaultKind::Delay) => namespace.delay(DELAY)?,
             (Wire::Namespace(namespace, _), FaultKind::Loss) => namespace.lose(LOST_OF_1000)?,
-            (Wire::Namespace(namespace, _), FaultKind::Partition) => namespace.lose(1000)?,
+            (Wire::Namespace(namespace, _), FaultKind::Partition) => namespace.cut()?,
         }
         Ok(())
     }

@@ -101,6 +101,7 @@ pub struct Host {
     /// By number of the display.
     inboxes: BTreeMap<u64, Inbox<Event>>,
     is_last: bool,
+    refused_last: Option<String>,
     report: HostReport,
     _held: (Vec<Subscriber<()>>, Vec<Queryable<()>>, LivelinessToken),
     session: Session,
@@ -173,6 +174,7 @@ impl Host {
             inputs: Vec::new(),
             inboxes: BTreeMap::new(),
             is_last: false,
+            refused_last: None,
             report: HostReport::default(),
             _held: (subscribers, queryables, token),
             session,
@@ -334,7 +336,11 @@ impl Host {
         };
         let answer = match answer {
             Err(reason) => {
-                tracing::warn!("a display is refused: {reason}");
+                // Who is refused asks again and again.
+                if self.refused_last.as_deref() != Some(&*reason) {
+                    tracing::warn!("a display is refused: {reason}");
+                    self.refused_last = Some(reason.clone());
+                }
                 self.report.refused += 1;
                 Err(reason)
             }
@@ -343,6 +349,7 @@ impl Host {
                     return self.deferred.push(query);
                 }
                 let Some(snapshot) = self.snapshot(graph) else { return self.deferred.push(query) };
+                self.refused_last = None;
                 if self.names.insert(join.display, join.name.clone()).is_none() {
                     tracing::info!("display `{}` joins at frame {}", join.name, self.publisher.last_frame());
                 }
