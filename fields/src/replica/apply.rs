@@ -301,7 +301,7 @@ impl Replica {
     }
 
     fn floats<T: Flat<COUNT>, const COUNT: usize>(&mut self, at: &[u8], bytes: &[u8]) -> Result<(), ReplicaError> {
-        if bytes.len() / (4 * COUNT) != at.len() / 6 || bytes.len() % (4 * COUNT) != 0 {
+        if bytes.len() / (4 * COUNT) != at.len() / 6 || !bytes.len().is_multiple_of(4 * COUNT) {
             return Err(damaged("it has more places than values, or fewer"));
         }
         let Replica { graph, held, types, shares, .. } = self;
