@@ -90,8 +90,7 @@ pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, 
 const FIRST_SLICE_M: f32 = 2.0;
 
 /// Ranges of distance, one per map: between equal steps and equal ratios (Zhang et al. 2006, Parallel-split shadow
-/// maps, section 3); where sight is far, equal steps would leave nothing for what is near, so they weigh less. Every slice but the first starts at 0 too where views look into different directions, since a map
-/// then holds what is near as well.
+/// maps, section 3); where sight is far, equal steps would leave nothing for what is near, so they weigh less.
 fn slices(eyes: &[Eye]) -> Vec<(f32, f32)> {
     let far = eyes.iter().map(|e| e.far).fold(0.0, f32::max) * 1.001;
     let near = eyes.iter().map(|e| e.near).fold(f32::INFINITY, f32::min).max((far * 0.01).min(FIRST_SLICE_M));
@@ -99,7 +98,7 @@ fn slices(eyes: &[Eye]) -> Vec<(f32, f32)> {
         return Vec::new();
     }
     let most = if far > 400.0 * near { 5.0 } else { 4.0 };
-    let count = ((far / near).log2() * 0.8).ceil().clamp(1.0, most);
+    let count = ((far / near).log2() * 1.2).ceil().clamp(1.0, most);
     let steps = 0.3 * (100.0 * FIRST_SLICE_M / far).min(1.0);
     let split = |i: f32| {
         let share = i / count;

@@ -197,6 +197,7 @@ const DISC_SAMPLES: u32 = 16u;
 // As wide as 16 bilinear comparisons, texels.
 const DISC_RADIUS: f32 = 2.5;
 const PENUMBRA_SAMPLES: u32 = 32u;
+const CONTACT_SAMPLES: u32 = 4u;
 // No penumbra is looked for beyond this, texels.
 const WIDEST_PENUMBRA: f32 = 160.0;
 
@@ -273,7 +274,8 @@ fn contact_hardening(light: Light, face: MapFace, r: Receiver) -> f32 {
         casters += dot(blocks, vec4<f32>(1.0));
     }
     if casters == 0.0 {
-        return 1.0;
+        // Samples so far apart miss what is thin.
+        return disc_filtered(face, r, 1.0, CONTACT_SAMPLES);
     }
     depth /= casters;
     var width = light.size * max(depth - r.depth, 0.0) * face.depth.x / face.texel;

@@ -115,38 +115,69 @@ fn thumb() -> Vec<Drawable> {
     all
 }
 
+/// Ten centimetres small, on a ground of 4 km, 1 km from the origin.
+fn pebbles() -> Vec<Drawable> {
+    let mut all = boxes(&[([0.1, 0.1, 0.1], [800.0, 0.05, 600.0]), ([0.1, 0.1, 0.1], [800.25, 0.05, 600.1])]);
+    all.push(shape(ball(32), grey(), at(800.0, 0.05, 600.3) * Mat4::from_scale(Vec3::splat(0.05))));
+    all.push(shape(plane(4000.0), grey(), Mat4::IDENTITY));
+    all
+}
+
+/// Draws and traces the shadow of the first light, in a world that stands `out` from the origin. Gives what is wrong away from edges,
+/// and the score.
+fn scored(name: &str, scene: &Scene, [eye, to]: [[f32; 3]; 2], out: Vec3) -> (Specks, Score) {
+    let mut view = look(name, Vec3::from(eye), Vec3::from(to), [320, 240]);
+    view.frustum = Frustum::symmetric(45f32.to_radians(), 4.0 / 3.0, 0.01);
+    let picture = Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view) }.around(-out);
+    let scene = scene.around(-out);
+    // Rays need fine numbers as maps do.
+    let home = origin_near_eyes(Vec3::ZERO, std::slice::from_ref(&picture));
+    let (near, seen) = (scene.around(home), &picture.around(home).views[0]);
+    let options = TraceOptions { sub_samples: 2, eps_scale: 1e-7, ..Default::default() };
+    let truth = Tracer::new(&near).visibility(&near.lights[0], seen, &options, &|_| ()).unwrap();
+    let shot = shoot(&scene, &picture);
+    assert_eq!(shot.problems, Vec::<String>::new());
+    let visibility: Vec<u8> = shot.layers[0].rgba.chunks_exact(4).map(|p| p[0]).collect();
+    let rgba = difference(&truth, &visibility).unwrap();
+    keep(&format!("{name}_difference"), &[umbriel_render::RgbaPixels { rgba, ..shot.layers[0].clone() }]);
+    let (away, score) = (specks(&truth, &visibility).unwrap(), score(&truth, &visibility).unwrap());
+    println!(
+        "{name}: {:.4} % specks, {:.4} % leaks, IoU {:.4}, {:.3} % disagree",
+        away.dark * 100.0,
+        away.lit * 100.0,
+        score.iou,
+        score.disagreement * 100.0
+    );
+    (away, score)
+}
+
 #[test]
 fn bias_tunes_itself() {
-    let lamp = Light { kind: LightKind::Point, position: Vec3::new(0.4, 2.3, 0.5), shadows: ShadowMethod::Map, ..noon() };
-    // Scene, light, eye and where it looks, the worst IoU.
+    let lamp = |kind, position| Light { kind, position, shadows: ShadowMethod::Map, ..noon() };
+    let bulb = lamp(LightKind::Point, Vec3::new(0.4, 2.3, 0.5));
+    // 170 degrees wide.
+    let wide = lamp(LightKind::Spot { inner_rad: 1.4, outer_rad: 1.4835 }, Vec3::new(0.4, 2.3, 0.5));
+    let far = Vec3::new(1e6, 2e4, -3e5);
+    let here = Vec3::ZERO;
+    // Scene, light, eye and where it looks, how far out, the worst IoU.
     let rows = [
-        ("field", field(), sun(Vec3::new(0.5, -0.6, 0.3)), [4.0, 2.0, 7.0], [0.0, 0.5, 0.0], 0.98),
-        ("forest", forest(), sun(Vec3::new(0.4, -1.0, -0.3)), [2.5, 5.0, 6.0], [0.3, 0.0, 0.0], 0.98),
-        ("curved", curved(), sun(Vec3::new(1.0, -0.25, -0.2)), [0.0, 2.5, 5.5], [0.3, 0.5, 0.0], 0.98),
-        ("railings", railings(), sun(Vec3::new(0.3, -1.0, 0.9)), [1.0, 1.8, 5.0], [0.0, 0.3, 1.0], 0.97),
-        ("room", room(), lamp, [-1.5, 1.7, 2.8], [0.2, 0.8, -1.0], 0.98),
-        ("thumb", thumb(), sun(Vec3::new(0.5, -0.8, -0.3)), [0.03, 0.12, 0.25], [0.0, 0.01, 0.0], 0.98),
+        ("field", field(), sun(Vec3::new(0.5, -0.6, 0.3)), [[4.0, 2.0, 7.0], [0.0, 0.5, 0.0]], here, 0.98),
+        ("field_far_out", field(), sun(Vec3::new(0.5, -0.6, 0.3)), [[4.0, 2.0, 7.0], [0.0, 0.5, 0.0]], far, 0.98),
+        ("forest", forest(), sun(Vec3::new(0.4, -1.0, -0.3)), [[2.5, 5.0, 6.0], [0.3, 0.0, 0.0]], here, 0.98),
+        ("curved", curved(), sun(Vec3::new(1.0, -0.25, -0.2)), [[0.0, 2.5, 5.5], [0.3, 0.5, 0.0]], here, 0.98),
+        // 3 degrees high.
+        ("evening", curved(), sun(Vec3::new(0.98, -0.0524, -0.19)), [[0.0, 2.5, 5.5], [0.3, 0.5, 0.0]], here, 0.98),
+        ("railings", railings(), sun(Vec3::new(0.3, -1.0, 0.9)), [[1.0, 1.8, 5.0], [0.0, 0.3, 1.0]], here, 0.97),
+        ("room", room(), bulb.clone(), [[-1.5, 1.7, 2.8], [0.2, 0.8, -1.0]], here, 0.98),
+        ("room_far_out", room(), bulb, [[-1.5, 1.7, 2.8], [0.2, 0.8, -1.0]], far, 0.98),
+        ("wide_spot", room(), wide, [[-1.5, 1.7, 2.8], [0.2, 0.8, -1.0]], here, 0.98),
+        ("thumb", thumb(), sun(Vec3::new(0.5, -0.8, -0.3)), [[0.03, 0.12, 0.25], [0.0, 0.01, 0.0]], here, 0.98),
+        ("pebbles", pebbles(), sun(Vec3::new(0.5, -0.6, 0.3)), [[800.3, 0.7, 601.2], [800.0, 0.0, 600.1]], here, 0.98),
     ];
     let mut failed = Vec::new();
-    for (name, drawables, light, eye, to, least) in rows {
+    for (name, drawables, light, eyes, out, least) in rows {
         let scene = Scene { drawables, lights: vec![light], ..Default::default() };
-        let mut view = look(&format!("bias_{name}"), Vec3::from(eye), Vec3::from(to), [320, 240]);
-        view.frustum = Frustum::symmetric(45f32.to_radians(), 4.0 / 3.0, 0.01);
-        let options = TraceOptions { sub_samples: 2, eps_scale: 1e-7, ..Default::default() };
-        let truth = Tracer::new(&scene).visibility(&scene.lights[0], &view, &options, &|_| ()).unwrap();
-        let shot = shoot(&scene, &Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view) });
-        assert_eq!(shot.problems, Vec::<String>::new());
-        let visibility: Vec<u8> = shot.layers[0].rgba.chunks_exact(4).map(|p| p[0]).collect();
-        let rgba = difference(&truth, &visibility).unwrap();
-        keep(&format!("bias_{name}_difference"), &[umbriel_render::RgbaPixels { rgba, ..shot.layers[0].clone() }]);
-        let (away, score) = (specks(&truth, &visibility).unwrap(), score(&truth, &visibility).unwrap());
-        println!(
-            "{name}: {:.4} % specks, {:.4} % leaks, IoU {:.4}, {:.3} % disagree",
-            away.dark * 100.0,
-            away.lit * 100.0,
-            score.iou,
-            score.disagreement * 100.0
-        );
+        let (away, score) = scored(&format!("bias_{name}"), &scene, eyes, out);
         if away.dark >= 0.0002 || away.lit >= 0.0002 || score.iou < least {
             failed.push(name);
         }
@@ -184,6 +215,28 @@ fn penumbrae_follow_from_the_size_of_the_light() {
         );
         assert!(soft.penumbra_pixels > 500 && soft.penumbra < 0.06 && soft.penumbra < 0.3 * hard.penumbra, "{name}");
     }
+}
+
+/// The samples that look for casters lie far apart where the source is wide; a thin post is found all the same.
+#[test]
+fn thin_casters_are_found_by_pcss() {
+    let mut drawables = boxes(&[([0.15, 1.0, 0.15], [0.0, 0.5, -0.5]), ([0.03, 1.0, 0.03], [0.4, 0.5, -0.3])]);
+    drawables.push(shape(plane(4.0), grey(), Mat4::IDENTITY));
+    let kind = LightKind::Spot { inner_rad: 0.28, outer_rad: 0.3 };
+    let position = Vec3::new(-1.5, 3.5, -2.5);
+    let map = MapSettings { filter: MapFilter::Pcss, size: 256, ..Default::default() };
+    let light =
+        Light { kind, position, direction: (-position).normalize(), size: 0.12, shadows: ShadowMethod::Map, map, ..noon() };
+    let scene = Scene { drawables, lights: vec![light], ..Default::default() };
+    let view = look("thin_by_pcss", Vec3::new(1.2, 2.2, 1.6), Vec3::new(0.25, 0.1, -0.3), [320, 240]);
+    let shot = shoot(&scene, &Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view) });
+    let value = |x: u32, y: u32| shot.pixel(x, y)[0];
+    let is_speck = |x: u32, y: u32| {
+        let around = [value(x - 1, y), value(x + 1, y), value(x, y - 1), value(x, y + 1)];
+        value(x, y) > 200 && around.iter().all(|v| *v < 60)
+    };
+    let specks = (1..319).flat_map(|x| (1..239).map(move |y| (x, y))).filter(|(x, y)| is_speck(*x, *y)).count();
+    assert_eq!(specks, 0, "lit pixels in the dark");
 }
 
 /// A probe that stands still looks at edges of shadows while a head beside it moves by centimetres; maps are fitted to what
