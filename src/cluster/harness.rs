@@ -165,43 +165,67 @@ fn file_name(show: &str) -> String {
     format!("{}.png", show.replace('/', "-"))
 }
 
-/// Compares what displays showed with a render of all in this process; gives the number of pictures that differ or are missing.
+/// What came of comparing the pictures of a display or of a channel.
+#[derive(Clone, Copy, Default)]
+struct Tally {
+    compared: usize,
+    different: usize,
+    largest: u8,
+    /// Of all channels drawn as one picture: pixels that are others there, of so many, and by how much at most. At its place in a larger
+    /// target a view's edges are rounded in another way.
+    beside: (usize, usize, u8),
+}
+
+/// Compares what displays showed with what this process draws of the same frames; gives the number of pictures that differ or are missing.
 fn compare(args: &cli::Cluster, shows: &[String], folder: &Path, frames: u64) -> Result<usize, Failure> {
     let mut session = Session::open(&args.path)?.wait_for_casters();
     let gpu = Gpu::new(None)?;
     let mut renderer = Renderer::new(&gpu)?;
-    let mut tally: BTreeMap<&str, (usize, usize, u8)> = BTreeMap::new();
+    let mut tallies: BTreeMap<&str, Tally> = BTreeMap::new();
     for frame in 1..=frames {
         session.step((frame - 1) as f64 / args.fps);
-        let files: Vec<(&String, PathBuf)> =
-            shows.iter().map(|show| (show, file_of(&folder.join(file_name(show)), frame))).collect();
-        if frame == 1 || files.iter().all(|(_, file)| !file.exists()) {
+        let shown: Vec<(&String, image::RgbaImage)> = shows
+            .iter()
+            .filter_map(|show| Some((show, image::open(file_of(&folder.join(file_name(show)), frame)).ok()?.to_rgba8())))
+            .collect();
+        if frame == 1 || shown.is_empty() {
             continue;
         }
         let pictures = session.pictures(None, DESKTOP_SIZE, &WindowSizes::new())?;
+        for (show, shown) in &shown {
+            let Some(alone) = pictures.iter().find_map(|picture| part(picture, show)) else { continue };
+            renderer.render_part(session.scene(), &[alone], &pictures)?;
+            let truth = png::row(&renderer.read_back(0)?);
+            let tally = tallies.entry(show.as_str()).or_default();
+            let (_, largest) = differences([truth.width, truth.height], &truth.rgba, shown);
+            tally.compared += 1;
+            tally.different += (largest > 0) as usize;
+            tally.largest = tally.largest.max(largest);
+        }
+        if !args.channels {
+            continue;
+        }
         renderer.render(session.scene(), &pictures)?;
         for (place, picture) in pictures.iter().enumerate() {
             let whole = png::row(&renderer.read_back(place)?);
-            for (show, file) in &files {
-                let Some([x, y, width, height]) = part(picture, show) else { continue };
-                let Ok(shown) = image::open(file) else { continue };
-                let shown = shown.to_rgba8();
-                let entry = tally.entry(show.as_str()).or_default();
-                entry.0 += 1;
+            for (show, shown) in &shown {
+                let Some([x, y, width, height]) = tile(picture, show) else { continue };
                 let line = |row: u32| ((y + row) * whole.width + x) as usize * 4;
-                let truth = (0..height).flat_map(|row| &whole.rgba[line(row)..line(row) + width as usize * 4]);
-                let differences = truth.zip(shown.as_raw()).map(|(a, b)| a.abs_diff(*b));
-                let largest =
-                    if (shown.width(), shown.height()) == (width, height) { differences.max().unwrap_or(0) } else { 255 };
-                entry.1 += (largest > 0) as usize;
-                entry.2 = entry.2.max(largest);
+                let lines = (0..height).flat_map(|row| &whole.rgba[line(row)..line(row) + width as usize * 4]);
+                let (count, largest) = differences([width, height], &lines.copied().collect::<Vec<u8>>(), shown);
+                let beside = &mut tallies.entry(show.as_str()).or_default().beside;
+                *beside = (beside.0 + count, beside.1 + (width * height) as usize, beside.2.max(largest));
             }
         }
     }
     let mut wrong = 0;
     for show in shows {
-        let (compared, different, largest) = tally.get(show.as_str()).copied().unwrap_or_default();
-        println!("{show}: {compared} pictures compared, {different} differ, largest difference {largest}/255");
+        let Tally { compared, different, largest, beside } = tallies.get(show.as_str()).copied().unwrap_or_default();
+        print!("{show}: {compared} pictures compared, {different} differ, largest difference {largest}/255");
+        if args.channels {
+            print!("; in one picture of all, {} of {} pixels by at most {}/255", beside.0, beside.1, beside.2);
+        }
+        println!();
         wrong += different + (compared == 0) as usize;
         if !args.breaks() && compared as u64 + 1 != frames {
             tracing::error!("{show}: {} of {} pictures are missing", frames - 1 - compared as u64, frames - 1);
@@ -211,8 +235,26 @@ fn compare(args: &cli::Cluster, shows: &[String], folder: &Path, frames: u64) ->
     Ok(wrong)
 }
 
+/// How many pixels differ, and by how much at most; all of them, entirely, where the sizes are others.
+fn differences([width, height]: [u32; 2], truth: &[u8], shown: &image::RgbaImage) -> (usize, u8) {
+    if (shown.width(), shown.height()) != (width, height) {
+        return (width as usize * height as usize, u8::MAX);
+    }
+    let of_pixel = |(a, b): (&[u8], &[u8])| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
+    let each = truth.chunks_exact(4).zip(shown.as_raw().chunks_exact(4)).map(of_pixel);
+    each.fold((0, 0), |(count, largest), by| (count + usize::from(by > 0), largest.max(by)))
+}
+
+/// A display or a channel of it as a picture of its own, as the process that shows it draws it.
+fn part(picture: &Picture, show: &str) -> Option<Picture> {
+    if picture.name == show {
+        return Some(picture.clone());
+    }
+    (0..picture.views.len()).filter_map(|place| channel(picture, place)).find(|one| one.name == show)
+}
+
 /// Where a display or a channel lies in the picture of its display.
-fn part(picture: &Picture, show: &str) -> Option<[u32; 4]> {
+fn tile(picture: &Picture, show: &str) -> Option<[u32; 4]> {
     if picture.name == show {
         let [width, height] = picture.size;
         return Some([0, 0, width, height]);
