@@ -1,5 +1,13 @@
 //! The `umbriel` command: shows worlds written in rhai and models, in windows or in files, and scores their shadows.
 
+/// Prints a line; a reader that has seen enough, such as `head`, is no problem.
+macro_rules! say {
+    ($($words:tt)*) => {{
+        use std::io::Write;
+        let _ = writeln!(std::io::stdout(), $($words)*);
+    }};
+}
+
 mod cli;
 #[cfg(feature = "cluster")]
 mod cluster;

@@ -80,7 +80,7 @@ fn viewpoint(graph: &mut Graph, bounds: &Aabb) -> Result<NodeId, umbriel_fields:
     )
 }
 
-/// A matt floor just below the model, wide enough for its shadow.
+/// A matt floor just below the model, wide enough for its shadow. Nothing is below that it could shade.
 fn ground(graph: &mut Graph, bounds: &Aabb) -> Result<NodeId, umbriel_fields::Error> {
     let radius = bounds.radius().max(1e-3);
     let side = 12.0 * radius;
@@ -90,7 +90,8 @@ fn ground(graph: &mut Graph, bounds: &Aabb) -> Result<NodeId, umbriel_fields::Er
     let material = create(graph, "PhysicalMaterial", &grey)?;
     let appearance = create(graph, "Appearance", &[("material", Some(material).into())])?;
     let plane = create(graph, "Plane", &[("size", Vec2::splat(side).into())])?;
-    let shape = create(graph, "Shape", &[("geometry", Some(plane).into()), ("appearance", Some(appearance).into())])?;
+    let fields = [("geometry", Some(plane).into()), ("appearance", Some(appearance).into()), ("cast_shadow", false.into())];
+    let shape = create(graph, "Shape", &fields)?;
     let transform = create(graph, "Transform", &[("translation", foot.into())])?;
     set_children(graph, transform, &[shape])?;
     Ok(transform)

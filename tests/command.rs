@@ -259,7 +259,7 @@ fn a_wrong_world_ends_with_a_message() {
 
 #[test]
 fn wrong_words_on_the_command_line() {
-    let rows: [(&[&str], &str); 9] = [
+    let rows: [(&[&str], &str); 12] = [
         (&["run", "nowhere.rhai", "--headless"], "nowhere.rhai"),
         (&["run", "nowhere.glb", "--headless"], "nowhere.glb"),
         (&["run", "a.txt", "--headless"], ".rhai"),
@@ -267,6 +267,9 @@ fn wrong_words_on_the_command_line() {
         (&["run", "a.rhai", "--headless", "--frames", "0"], "--frames"),
         (&["run", "a.rhai", "--headless", "--time", "NaN"], "--time"),
         (&["shadow-error", "--scene", "nowhere.json"], "nowhere.json"),
+        (&["shadow-error", "--models", "nowhere"], "nowhere: No such file or directory"),
+        (&["shadow-error", "--models", "docs"], "docs: there are no models (.gltf, .glb) in it"),
+        (&["shadow-error", "a.rhai", "--eyes", "0"], "--eyes"),
         (&["shadow-map", "nowhere.rhai"], "nowhere.rhai"),
         (&["nodes", "Transfrom"], "Transform"),
     ];

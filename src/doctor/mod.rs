@@ -45,7 +45,7 @@ pub(crate) fn run(args: &Doctor) -> Result<usize, Failure> {
         let (bytes, left_outside) = file.write(&treated)?;
         left_outside.iter().for_each(|what| tracing::warn!("{}: {what}", out.display()));
         std::fs::write(out, &bytes).map_err(|e| format!("{}: {e}", out.display()))?;
-        println!("written {}: {} bytes", out.display(), bytes.len());
+        say!("written {}: {} bytes", out.display(), bytes.len());
     }
     if let Some(path) = &args.picture {
         let before: Vec<(Mesh, Mat4)> = patients.iter().map(|p| (p.mesh.clone(), p.scene_from_mesh)).collect();
@@ -54,7 +54,7 @@ pub(crate) fn run(args: &Doctor) -> Result<usize, Failure> {
             .zip(&treated)
             .map(|(p, mended)| (mended.as_ref().map_or_else(|| p.mesh.clone(), |m| m.apply(&p.mesh)), p.scene_from_mesh));
         picture::write(path, &before, &after.collect::<Vec<_>>())?;
-        println!(
+        say!(
             "written {}: before and after; red: open, magenta: more than two triangles, yellow: wound against each other, blue: backs",
             path.display()
         );
@@ -107,20 +107,20 @@ fn treat(patient: &Patient, args: &Doctor) -> Option<Mended> {
     let Patient { label, path, mesh, .. } = patient;
     let place = if path.is_empty() { String::new() } else { format!(" at {path}") };
     if mesh.topology != Topology::Triangles {
-        println!("{label}{place}\n  {:?}: not examined", mesh.topology);
+        say!("{label}{place}\n  {:?}: not examined", mesh.topology);
         return None;
     }
     let steps = steps(args, mesh);
     let findings = examine(mesh, steps.weld_m.unwrap_or_else(|| natural_weld_m(mesh)));
     let deforms = if mesh.joints.is_empty() && mesh.morph_targets.is_empty() { "" } else { "  it deforms; examined at rest\n" };
-    println!("{label}{place}\n{deforms}{}", indented(&findings.to_string()));
+    say!("{label}{place}\n{deforms}{}", indented(&findings.to_string()));
     if steps.is_none() {
         return None;
     }
     let mended = mend(mesh, &steps);
-    println!("  mended: {}", mended.done);
+    say!("  mended: {}", mended.done);
     if !mended.is_unchanged() {
-        println!("{}", indented(&mended.findings.to_string()));
+        say!("{}", indented(&mended.findings.to_string()));
     }
     Some(mended)
 }
@@ -134,7 +134,7 @@ fn summary(patients: &[Patient], treated: &[Option<Mended>]) -> usize {
     let meshes: Vec<usize> = (0..patients.len()).filter(|i| patients[*i].mesh.topology == Topology::Triangles).collect();
     let before: Vec<_> = meshes.iter().map(|i| examine(&patients[*i].mesh, 0.0)).collect();
     let count = |is: &dyn Fn(&umbriel_scene::doctor::Findings) -> bool| before.iter().filter(|f| is(f)).count();
-    println!(
+    say!(
         "meshes={} sound={} closed={} two_manifold={} oriented={}",
         meshes.len(),
         count(&|f| f.is_sound()),
@@ -146,6 +146,6 @@ fn summary(patients: &[Patient], treated: &[Option<Mended>]) -> usize {
         return meshes.len() - count(&|f| f.is_sound());
     }
     let sound = meshes.iter().filter(|i| treated[**i].as_ref().is_some_and(|m| m.findings.is_sound())).count();
-    println!("mended: meshes={} sound={sound}", meshes.len());
+    say!("mended: meshes={} sound={sound}", meshes.len());
     meshes.len() - sound
 }

@@ -77,7 +77,7 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
         if args.size.is_none() {
             subject.view.size = eye_path::SIZE;
         }
-        println!("{shown}, {places} places, {}x{}", subject.view.size[0], subject.view.size[1]);
+        say!("{shown}, {places} places, {}x{}", subject.view.size[0], subject.view.size[1]);
         let gpu = Gpu::new(None)?;
         let bar = progress(places, "places");
         let views = eye_path::path(&subject.scene, &subject.view, places);
@@ -86,7 +86,7 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
         for problem in &subject.problems {
             tracing::error!("{problem}");
         }
-        println!("{found}");
+        say!("{found}");
         if args.diff.is_none() {
             return Ok(subject.problems.len());
         }
@@ -103,26 +103,26 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
     }
     let score = score(&truth, &visibility)?;
     if let Some(reduced) = reduced_casters(&subject.scene) {
-        println!("{reduced}");
+        say!("{reduced}");
     }
     if let Some(path) = &args.diff {
         let [width, height] = subject.view.size;
         png::write(path, &RgbaPixels { width, height, rgba: difference(&truth, &visibility)? }, &by)?;
     }
-    println!("{shown}, view '{}' {}x{}, {by}", subject.view.name, subject.view.size[0], subject.view.size[1]);
+    say!("{shown}, view '{}' {}x{}, {by}", subject.view.name, subject.view.size[0], subject.view.size[1]);
     let away = specks(&truth, &visibility)?;
-    println!(
-        "away from edges: {:.4}% of what is lit is dark, {:.4}% of what is dark is lit",
-        100.0 * away.dark,
-        100.0 * away.lit
-    );
-    println!("disagreement={:.4}% iou={:.4} pixels={}", 100.0 * score.disagreement, score.iou, score.pixels);
+    say!("away from edges: {:.4}% of what is lit is dark, {:.4}% of what is dark is lit", 100.0 * away.dark, 100.0 * away.lit);
+    say!("disagreement={:.4}% iou={:.4} pixels={}", 100.0 * score.disagreement, score.iou, score.pixels);
     let light = &subject.scene.lights[subject.light];
     if args.penumbra || (light.soft && light.shadows == ShadowMethod::Volume) {
         let score = trace_shares(&subject)?.score(&visibility)?;
-        println!(
+        say!(
             "light of size {}: mean error in the penumbra={:.4} overall={:.5} penumbra pixels={} pixels={}",
-            light.size, score.penumbra, score.overall, score.penumbra_pixels, score.pixels
+            light.size,
+            score.penumbra,
+            score.overall,
+            score.penumbra_pixels,
+            score.pixels
         );
     }
     Ok(subject.problems.len())

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use umbriel_displays::WindowSizes;
 use umbriel_displays::rig::{Rig, Wanted};
 use umbriel_render::{Gpu, Renderer};
-use umbriel_scene::{Aabb, Light, LightKind, Scene, ShadowMethod, View};
+use umbriel_scene::{Aabb, Frustum, Light, LightKind, Scene, ShadowMethod, View};
 use umbriel_scenegraph::Extractor;
 use umbriel_scripts::World;
 
@@ -27,8 +27,8 @@ pub(super) fn run(folder: &Path, args: &ShadowError) -> Result<usize, Failure> {
     let mut renderer = Renderer::new(&gpu)?;
     let method = args.method.map_or(ShadowMethod::Volume, Into::into);
     let size = args.size.unwrap_or(if args.eyes.is_some() { eye_path::SIZE } else { SIZE });
-    println!("shadows by {method:?}, {}x{}, {} of each, {}", size[0], size[1], places(args.eyes), describe(&gpu));
-    println!("| model | light | triangles | disagreement | iou | inverted |\n|---|---|---|---|---|---|");
+    say!("shadows by {method:?}, {}x{}, {} of each, {}", size[0], size[1], places(args.eyes), describe(&gpu));
+    say!("| model | light | triangles | disagreement | iou | inverted |\n|---|---|---|---|---|---|");
     let (mut all, mut rows, mut problems) = (Worst::new(), 0, BTreeSet::new());
     let bar = progress(files.len() as u32, "models");
     for file in &files {
@@ -43,7 +43,7 @@ pub(super) fn run(folder: &Path, args: &ShadowError) -> Result<usize, Failure> {
                     let label = light.name.clone();
                     subject.scene.lights = vec![light];
                     let found = row(&mut renderer, &mut subject, args.eyes)?;
-                    bar.suspend(|| println!("| {name} | {label} | {} | {}", triangles(&subject.scene), cells(&found)));
+                    bar.suspend(|| say!("| {name} | {label} | {} | {}", triangles(&subject.scene), cells(&found)));
                     all.add(&found);
                     rows += 1;
                 }
@@ -56,7 +56,7 @@ pub(super) fn run(folder: &Path, args: &ShadowError) -> Result<usize, Failure> {
     for problem in &problems {
         tracing::error!("{problem}");
     }
-    println!("models={} rows={rows}\n{all}", files.len());
+    say!("models={} rows={rows}\n{all}", files.len());
     Ok(problems.len())
 }
 
@@ -111,10 +111,19 @@ fn placed(file: &Path, time_s: f64, (size, sub_samples): ([u32; 2], u32)) -> Res
     let wanted = Wanted { view: None, size, windows: &WindowSizes::new() };
     let found = Rig::new().pictures(world.graph(), extractor.viewpoints(), &bounds, &wanted)?;
     let view = found.pictures.into_iter().flat_map(|p| p.views).next().ok_or("there is nothing to see it from")?;
-    Ok((Subject { scene, light: 0, view: View { size, ..view }, options: world_options(sub_samples), problems }, bounds))
+    let view = View { size, frustum: widened(view.frustum), ..view };
+    Ok((Subject { scene, light: 0, view, options: world_options(sub_samples), problems }, bounds))
 }
 
-/// A sun, a spot that takes in the whole model, and a lamp so near that its shadow is long.
+/// The camera takes in the model; the floor beside it, where the shadow lies, is seen too.
+fn widened(frustum: Frustum) -> Frustum {
+    let Frustum { left, right, bottom, top, near } = frustum;
+    let [left, right, bottom, top] = [left, right, bottom, top].map(|edge| 1.6 * edge);
+    Frustum { left, right, bottom, top, near }
+}
+
+/// A sun, a spot that takes in the whole model, and a lamp so near that its shadow is long. They stand behind the model on the
+/// left, and the camera before it on the right.
 fn lights(bounds: &Aabb, method: ShadowMethod, map_size: Option<u32>) -> [Light; 3] {
     let (centre, radius) = (bounds.centre(), bounds.radius().max(1e-3));
     let at = |x: f32, y: f32, z: f32| centre + radius * Vec3::new(x, y, z);
@@ -125,8 +134,8 @@ fn lights(bounds: &Aabb, method: ShadowMethod, map_size: Option<u32>) -> [Light;
         light
     };
     [
-        light("directional", LightKind::Directional, at(-0.7, 1.5, 0.9)),
-        light("spot", LightKind::Spot { inner_rad: 0.5, outer_rad: 0.6 }, at(1.4, 2.4, 0.8)),
-        light("point", LightKind::Point, at(-0.4, 1.6, 0.9)),
+        light("directional", LightKind::Directional, at(-1.2, 1.5, -0.5)),
+        light("spot", LightKind::Spot { inner_rad: 0.5, outer_rad: 0.6 }, at(-0.9, 2.6, -1.0)),
+        light("point", LightKind::Point, at(-1.1, 1.6, 0.1)),
     ]
 }
