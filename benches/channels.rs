@@ -2,8 +2,8 @@
 //!
 //! `cargo bench --bench channels`, or with the pixels of a channel behind `--`, such as `-- 1920x1080`, and
 //! names of rows, such as `"1 | volumes | still"`, to draw these alone. The loop is that of the
-//! command: the world takes a step, its scene is brought up to date, the rig becomes views, and all of them are drawn; a frame
-//! is done before the next begins. Nothing is written to files. "Sailing" moves the ship, and with it the whole world past the
+//! command: the world takes a step, its scene is brought up to date, the rig becomes views, and all of them are drawn; one
+//! frame is drawn while the next is made, as in a window. Nothing is written to files. "Sailing" moves the ship, and with it the whole world past the
 //! channels, in every frame. Rows are drawn in turns.
 
 use glam::{Vec2, Vec3};
@@ -47,8 +47,9 @@ fn main() -> Outcome<()> {
         for (_, bridge, times) in &mut rows {
             let start = Instant::now();
             for _ in 0..FRAMES {
-                bridge.frame(&gpu)?;
+                bridge.frame()?;
             }
+            bridge.renderer.wait()?;
             // The first turn makes pipelines.
             if turn > 0 {
                 times.push(start.elapsed().as_secs_f64() / f64::from(FRAMES));
@@ -101,7 +102,7 @@ impl Bridge {
         })
     }
 
-    fn frame(&mut self, gpu: &Gpu) -> Outcome<()> {
+    fn frame(&mut self) -> Outcome<()> {
         self.frame += 1;
         if self.sails {
             let along = 0.02 * (self.frame % 200) as f32;
@@ -116,7 +117,7 @@ impl Bridge {
         let wanted = Wanted { view: None, size: [320, 256], windows: &WindowSizes::new() };
         let pictures = self.rig.pictures(self.world.graph(), self.extractor.viewpoints(), &Aabb::EMPTY, &wanted)?.pictures;
         self.renderer.render(&self.scene, &pictures)?;
-        gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
+        self.renderer.wait_for_room()?;
         Ok(())
     }
 }

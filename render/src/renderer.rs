@@ -50,6 +50,8 @@ pub struct Renderer {
     problems: Problems,
     clock: Clock,
     frame: u64,
+    /// The frame before the last, and the last.
+    submitted: [Option<wgpu::SubmissionIndex>; 2],
     samples: Samples,
     /// Frames are drawn around this place of the world.
     origin: Vec3,
@@ -82,6 +84,7 @@ impl Renderer {
             problems: Problems::default(),
             clock: Clock::new(device, &gpu.queue),
             frame: 0,
+            submitted: [None, None],
             samples,
             origin: Vec3::ZERO,
             layouts,
@@ -322,7 +325,8 @@ impl Renderer {
             }
         }
         self.clock.resolve(&mut encoder);
-        queue.submit([encoder.finish()]);
+        let submitted = queue.submit([encoder.finish()]);
+        self.submitted = [self.submitted[1].take(), Some(submitted)];
         stats.gpu_s = self.clock.collect(device);
     }
 
@@ -349,6 +353,14 @@ impl Renderer {
     fn finished(&self, index: usize) -> Result<&Target, Error> {
         let count = self.targets.len();
         self.targets.get(index).and_then(|t| t.as_ref()).ok_or(Error::NoPicture { index, count })
+    }
+
+    /// Waits until the frame before the last is drawn, so that no more than two are in the making: the device draws one while the
+    /// next is recorded.
+    pub fn wait_for_room(&self) -> Result<(), Error> {
+        let Some(submission_index) = self.submitted[0].clone() else { return Ok(()) };
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission_index), timeout: None };
+        self.gpu.device.poll(wait).map(drop).map_err(|e| Error::Device(e.to_string()))
     }
 
     /// Waits until the last frame is drawn.

@@ -181,6 +181,14 @@ impl<'a> Watch<'a> {
         let toward = self.light.toward_light.as_dvec4();
         let volume = reach::swept(&corners, toward, reach);
         let margin = hull::margin(&volume) + hull::margin(&sight.near_rectangle);
+        let culls = self.light.settings.culling;
+        if culls
+            && (self.light.misses(bounds)
+                || sight.is_outside(&volume, margin)
+                || hull::planes(&self.lit).iter().any(|p| p.is_finite() && hull::is_behind(&volume, *p, margin)))
+        {
+            return None;
+        }
         let is_safe = self.light.settings.counting == VolumeCounting::Auto
             && hull::are_apart(&self.between, &corners, self.axes.iter().copied(), margin);
         // Under parallel light without end the far cap is a point, whatever else is asked for.
@@ -192,14 +200,8 @@ impl<'a> Watch<'a> {
             choice.convex_hides = surface == Surface::Front;
             choice.far_caps &= reach.has_end() && !reach.behind.is_some_and(is_in_front);
         }
-        if !self.light.settings.culling {
+        if !culls {
             return Some(choice);
-        }
-        if self.light.misses(bounds)
-            || sight.is_outside(&volume, margin)
-            || hull::planes(&self.lit).iter().any(|p| p.is_finite() && hull::is_behind(&volume, *p, margin))
-        {
-            return None;
         }
         choice.near_caps &= !sight.is_outside(&corners, margin);
         choice.far_caps &= !sight.is_outside(&volume[8..], margin);
@@ -211,8 +213,7 @@ impl<'a> Watch<'a> {
             && let Some(tiles) = sight.tiles()
         {
             let along = toward.truncate() - bounds.centre().as_dvec3() * toward.w;
-            let mut axes = vec![sight.ahead.truncate()];
-            axes.extend(DVec3::AXES.iter().flat_map(|axis| [*axis, along.cross(*axis)]));
+            let axes = DVec3::AXES.map(|axis| along.cross(axis));
             choice.scissor = tiles.touched(&volume, &axes, choice.scissor, margin)?;
         }
         Some(choice)
