@@ -56,6 +56,8 @@ fn fill(stage: &Stage, engine: &Engine, node: Node, parts: &Map) -> Outcome<()> 
     for (name, value) in &inputs {
         stage.add_field(node, name, value)?;
     }
+    let other = |name: &str| !["inputs", CODE, VALUE].contains(&name);
+    parts.iter().filter(|(name, _)| other(name)).try_for_each(|(name, value)| crate::words::set(stage, node, name, value))?;
     let code = parts.get(CODE).map(ToString::to_string).unwrap_or_default();
     stage.set(node, CODE, &code.clone().into())?;
     let wrong = |error: Box<EvalAltResult>| -> Box<EvalAltResult> {
@@ -68,6 +70,10 @@ fn fill(stage: &Stage, engine: &Engine, node: Node, parts: &Map) -> Outcome<()> 
     }
     match parts.get(VALUE) {
         Some(value) => stage.add_field(node, VALUE, value)?,
+        None if code.trim().is_empty() => {
+            let message = format!("{} has no `code`, and no `value` that says what it computes", stage.label(node));
+            return stage.fault_at(node, CODE, message).throw();
+        }
         None => {
             let variables = stage.read(|graph| variables(stage, graph, node.0));
             let mut nothing = Graph::new(Vec::new());
@@ -75,8 +81,7 @@ fn fill(stage: &Stage, engine: &Engine, node: Node, parts: &Map) -> Outcome<()> 
             stage.add_field(node, VALUE, &first)?;
         }
     }
-    let other = |name: &str| !["inputs", CODE, VALUE].contains(&name);
-    parts.iter().filter(|(name, _)| other(name)).try_for_each(|(name, value)| crate::words::set(stage, node, name, value))
+    Ok(())
 }
 
 /// The turn of an Expression: reads inputs, computes, writes `value`.

@@ -188,6 +188,8 @@ fn mistakes_when_made() {
             &["test:2:1", "column 5", "no input `b`"][..],
         ),
         ("make(\"Expression\", #{ inputs: 3, code: \"1\" });", &["test:1:1", "takes a map"]),
+        ("make(\"Expression\", #{ inputs: #{ a: 1.0 } });", &["test:1:1", "has no `code`"]),
+        ("make(\"Expression\", #{ expression: \"1 + 2\" });", &["test:1:1", "no field `expression`"]),
         ("make(\"Expression\", #{ inputs: #{ a: 1.0 }, code: \"(a\", value: 0.0 });", &["test:1:1", "column"]),
         ("fn f() { make(\"Expression\", #{ code: \"f()\" }) } f();", &["sees its inputs only"]),
         ("define(\"A\", #{ extends: \"Trasform\" });", &["test:1:1", "Trasform", "Transform"]),
