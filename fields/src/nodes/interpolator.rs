@@ -14,6 +14,7 @@ const KEY_VALUE: u16 = 2;
 const INTERPOLATION: u16 = 3;
 const VALUE_CHANGED: u16 = 4;
 
+const LINEAR: EnumValue = EnumValue(0);
 const STEP: EnumValue = EnumValue(1);
 const CUBIC_SPLINE: EnumValue = EnumValue(2);
 
@@ -78,8 +79,13 @@ where
     })
 }
 
-/// Items that are blended as something else.
-fn many<T, B>(name: &str, doc: &str, blended: fn(T) -> B, plain: fn(B) -> T) -> NodeType
+/// Items that are blended as something else. The ways there and back are known when it is compiled: they are gone for each item.
+fn many<T, B>(
+    name: &str,
+    doc: &str,
+    blended: impl Fn(T) -> B + Copy + Send + Sync + 'static,
+    plain: impl Fn(B) -> T + Copy + Send + Sync + 'static,
+) -> NodeType
 where
     T: FieldValue + Copy,
     B: Blend + 'static,
@@ -88,6 +94,11 @@ where
     declare::<T>(name, doc, <Arc<[T]>>::empty().into()).evaluate(move |evaluation| {
         let list = prepare::<T>(evaluation, None).map(|Ready { values, keys, mode, span }| {
             let per_key = values.len() / (keys * stride(mode));
+            if mode == LINEAR && span.from != span.to {
+                let [from, to] = [span.from, span.to].map(|key| &values[key * per_key..][..per_key]);
+                let pairs = from.iter().zip(to);
+                return pairs.map(|(from, to)| plain(B::blend(blended(*from), blended(*to), span.share))).collect::<Arc<[T]>>();
+            }
             let at = |item| plain(sample(|at| blended(values[at]), per_key, item, mode, span));
             (0..per_key).map(at).collect::<Arc<[T]>>()
         });
