@@ -151,7 +151,7 @@ impl Recorder<'_> {
         self.surfaces(pass, &view.opaque, if view.lit_slot.is_some() { Pass::Depth } else { view.base_pass() });
         if !view.is_visibility {
             pass.set_pipeline(&self.screen.background);
-            pass.set_bind_group(3, self.lighting, &[]);
+            pass.set_bind_group(1, self.lighting, &[]);
             pass.draw(0..3, 0..1);
         }
     }

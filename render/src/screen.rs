@@ -39,7 +39,7 @@ impl Screen {
                 immediate_size: 0,
             })
         };
-        let background_layout = layout("background", &[Some(&layouts.view), None, None, Some(&layouts.lighting)]);
+        let background_layout = layout("background", &[Some(&layouts.view), Some(&layouts.lighting)]);
         let film_layout = layout("film", &[None, Some(&layouts.film)]);
         let compose_layout = layout("compose", &[Some(&layouts.view), Some(&layouts.picture)]);
         let compose_module = shaders::module(device, "compose", shaders::COMPOSE);
@@ -52,7 +52,7 @@ impl Screen {
         Screen {
             background: pipeline(
                 device,
-                (&background_layout, &shaders::module(device, "background", shaders::BACKGROUND)),
+                (&background_layout, &shaders::module(device, "background", &[&shaders::background()])),
                 "background",
                 (LINEAR_FORMAT, None, ColorWrites::ALL),
                 Some((samples, CompareFunction::Equal, wgpu::StencilState::default())),

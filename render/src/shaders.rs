@@ -94,6 +94,12 @@ pub(crate) const SOFT_FILM: &[&str] = &[
     include_str!("soft/film.wgsl"),
 ];
 
+/// What is behind everything. Its second bind group is what surfaces have as their fourth: in Vulkan, to bind a group behind groups that were
+/// bound for other layouts may disturb the first one, the view, and on some cards it does.
+pub(crate) fn background() -> String {
+    BACKGROUND.concat().replace("@group(3)", "@group(1)")
+}
+
 /// A shader that reads the view's depth or stencil, for so many samples of them.
 pub(crate) fn of_samples(samples: Samples, parts: &[&str]) -> String {
     let head = match samples {
@@ -130,7 +136,7 @@ mod tests {
         let sampled = [("hard shadow", HARD_SHADOW), ("soft film", SOFT_FILM)]
             .into_iter()
             .flat_map(|(name, parts)| [Samples::One, Samples::Four].map(|samples| (name, of_samples(samples, parts))));
-        others.chain(sampled).chain([("surface", surface())]).collect()
+        others.chain(sampled).chain([("surface", surface()), ("background beside the view", background())]).collect()
     }
 
     #[test]

@@ -101,7 +101,7 @@ fn passes_are_timed() {
     }
     if gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
         let kinds: Vec<&str> = stats.gpu_s.iter().map(|(k, _)| *k).collect();
-        assert_eq!(kinds, ["shadow maps", "surfaces", "compose"]);
+        assert_eq!(kinds, ["shadow maps", "views", "compose"]);
         assert!(stats.gpu_s.iter().all(|(_, s)| (0.0..5.0).contains(s)) && stats.gpu_s[1].1 > 0.0, "{:?}", stats.gpu_s);
     }
     assert!(stats.prepare_s > 0.0 && stats.encode_s > 0.0);

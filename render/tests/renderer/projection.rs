@@ -255,9 +255,16 @@ fn a_picture_falls_where_it_is_projected() {
         scene.projectors = vec![Some(source)];
         let shot = shooter.shoot(&scene, &Picture::mono(look("slide", Vec3::Y * 12.0, Vec3::ZERO, [100, 100])));
         assert_eq!(shot.problems, Vec::<String>::new(), "{name}");
-        let found = [(30, 30), (70, 30), (3, 30)].map(|(x, y)| <[u8; 3]>::try_from(&shot.pixel(x, y)[..3]).unwrap());
-        assert_eq!(found, expected, "{name}");
+        for ((x, y), expected) in [(30, 30), (70, 30), (3, 30)].into_iter().zip(expected) {
+            assert_bytes(&shot.pixel(x, y)[..3], &expected, name);
+        }
     }
+}
+
+/// The same colour, whichever way a device rounds.
+fn assert_bytes(found: &[u8], expected: &[u8], name: &str) {
+    let is_near = found.iter().zip(expected).all(|(a, b)| a.abs_diff(*b) <= 1);
+    assert!(is_near, "{name}: {found:?}, not {expected:?}");
 }
 
 #[test]
@@ -275,7 +282,7 @@ fn a_bound_viewpoint_projects_by_its_window() {
         scene.drawables.truncate(1);
         scene.projectors = vec![Some(Projector::Viewpoint { world_from_view: camera, angle_rad: 1.0, world_from_camera })];
         let shot = shooter.shoot(&scene, &Picture::mono(view.clone()));
-        assert_eq!(shot.pixel(2, 32)[..3], far_left, "{name}");
+        assert_bytes(&shot.pixel(2, 32)[..3], &far_left, name);
         assert_eq!([shot.pixel(60, 32)[0], shot.pixel(68, 32)[1]], [255, 255], "{name}");
     }
 }
