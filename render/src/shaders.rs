@@ -5,7 +5,6 @@ use umbriel_scene::Samples;
 /// Name and parts of every shader but that of surfaces.
 #[cfg(test)]
 pub(crate) const ALL: &[(&str, &[&str])] = &[
-    ("background", BACKGROUND),
     ("film", FILM),
     ("compose", COMPOSE),
     ("maps", MAPS),
@@ -42,7 +41,7 @@ pub fn surface() -> String {
     [&SURFACE_BEFORE_HOOKS.concat(), &crate::author::standard_hooks(), SURFACE_BEHIND_HOOKS].concat()
 }
 
-pub(crate) const BACKGROUND: &[&str] = &[
+const BACKGROUND: &[&str] = &[
     include_str!("shaders/view.wgsl"),
     include_str!("shaders/light.wgsl"),
     include_str!("shaders/fullscreen.wgsl"),
@@ -136,7 +135,7 @@ mod tests {
         let sampled = [("hard shadow", HARD_SHADOW), ("soft film", SOFT_FILM)]
             .into_iter()
             .flat_map(|(name, parts)| [Samples::One, Samples::Four].map(|samples| (name, of_samples(samples, parts))));
-        others.chain(sampled).chain([("surface", surface()), ("background beside the view", background())]).collect()
+        others.chain(sampled).chain([("surface", surface()), ("background", background())]).collect()
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub(super) struct Tiles {
     /// Pixels of a tile's side.
     side: u32,
     across: u32,
-    /// The view's direction and the axes of the world.
+    /// The view's direction and the axes of the world, unit vectors.
     fixed: [DVec3; 4],
     cells: Vec<Option<Cell>>,
 }
@@ -146,7 +146,7 @@ impl Tiles {
                 depths.1 = hiding.beyond(tile, grid.near).map_or(depths.1, |far| depths.1.min(far));
             });
         }
-        let fixed = [-view_from_world.row(2).truncate(), DVec3::X, DVec3::Y, DVec3::Z];
+        let fixed = [-view_from_world.row(2).truncate().normalize_or_zero(), DVec3::X, DVec3::Y, DVec3::Z];
         let cells = tiles.into_iter().zip(depths).map(|(tile, (low, high))| {
             // Rounding, of the device and of the boxes, and what lies exactly in a plane.
             let slack = 1e-3 + 1e-4 * high;
