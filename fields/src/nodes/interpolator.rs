@@ -94,6 +94,7 @@ where
     declare::<T>(name, doc, <Arc<[T]>>::empty().into()).evaluate(move |evaluation| {
         let list = prepare::<T>(evaluation, None).map(|Ready { values, keys, mode, span }| {
             let per_key = values.len() / (keys * stride(mode));
+            // Twice as fast as to ask for mode and span at each item.
             if mode == LINEAR && span.from != span.to {
                 let [from, to] = [span.from, span.to].map(|key| &values[key * per_key..][..per_key]);
                 let pairs = from.iter().zip(to);
