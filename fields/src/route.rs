@@ -102,8 +102,11 @@ impl Graph {
     /// Errors: types that do not convert, a route that exists, and strong routes that would form a loop.
     pub fn connect(&mut self, from: FieldId, to: FieldId, strength: Strength) -> Result<RouteId, Error> {
         let route = self.link(from, to, strength)?;
-        self.note(|| Event::Connected { route, from, to, strength });
         self.deliver_at_once(route);
+        if self.journal.is_some() {
+            let held = self.value(to)?;
+            self.note(|| Event::Connected { route, from, to, strength, held });
+        }
         Ok(route)
     }
 

@@ -23,6 +23,8 @@ pub(crate) enum Event {
         from: FieldId,
         to: FieldId,
         strength: Strength,
+        /// What the target held right after that.
+        held: Value,
     },
     /// A route made without delivering what the source holds.
     Linked {

@@ -136,7 +136,7 @@ impl<W: Write> Recorder<W> {
                 EventRecord::Wrote { field: self.numbers.place(*field), silent: *silent, value: self.value(value) }
             }
             Event::Touched(field) => EventRecord::Touched(self.numbers.place(*field)),
-            Event::Connected { route, from, to, strength } | Event::Linked { route, from, to, strength } => {
+            Event::Connected { route, from, to, strength, .. } | Event::Linked { route, from, to, strength } => {
                 EventRecord::Connected {
                     route: self.numbers.routes.number(*route),
                     from: self.numbers.place(*from),

@@ -41,6 +41,8 @@ pub struct Mirror {
     /// What waits for the application, with the number of the message that told of it.
     pending: HashMap<FieldId, u64>,
     pending_names: HashMap<NodeId, u64>,
+    /// Numbers of nodes that were deleted here.
+    pending_deletions: HashMap<u64, u64>,
     hashes: ImageHashes,
     sent: HashSet<u64>,
     /// Nodes of others that came or went since somebody asked.
@@ -66,6 +68,9 @@ impl Mirror {
 
     /// The node that was made here as the `key`th has a number in the application now.
     pub fn made(&mut self, key: u32, number: u64) {
+        if let Some(of) = self.pending_deletions.remove(&own_number(key)) {
+            self.pending_deletions.insert(number, of);
+        }
         let Some(node) = self.keys.get(key as usize).copied() else { return };
         self.by_number.insert(number, node);
         if let Some(known) = self.numbers.get_mut(&node) {
@@ -90,6 +95,11 @@ impl Mirror {
         // What comes from the application is not told to it.
         let journal = graph.journal.take();
         let theirs = replica.graph();
+        let is_refused = |(number, of): (&u64, &u64)| *of <= applied && replica.node(*number).is_some();
+        if self.pending_deletions.iter().any(is_refused) {
+            self.restart(); // the application keeps a node that was deleted here, and what refers to it
+        }
+        self.pending_deletions.retain(|_, of| *of > applied);
         let is_restart = self.mark == 0;
         let nodes = match theirs.changes_since(self.mark) {
             Changes::Nodes(nodes) if !is_restart => nodes,
@@ -138,7 +148,8 @@ impl Mirror {
         if self.local.contains_key(&id) {
             return false;
         }
-        let Some(number) = replica.number(id) else { return false };
+        let number = replica.number(id).filter(|number| !self.pending_deletions.contains_key(number));
+        let Some(number) = number else { return false };
         let theirs = replica.graph();
         let known = self.by_number.get(&number).copied().filter(|node| graph.contains(*node));
         // A new graph has its root already.
@@ -310,15 +321,17 @@ impl Mirror {
                     None => writer.write(graph, *field, value),
                 },
                 Event::Touched(field) => writer.touch(graph, *field),
-                Event::Connected { from, to, strength, .. } | Event::Linked { from, to, strength, .. } => {
-                    writer.route(graph, *from, *to, *strength)
+                // A route whose source is gone again has left its value behind.
+                Event::Connected { from, to, strength, held, .. } => {
+                    writer.route(graph, *from, *to, *strength).or_else(|| writer.write(graph, *to, held))
                 }
+                Event::Linked { from, to, strength, .. } => writer.route(graph, *from, *to, *strength),
                 Event::Disconnected(_) => gone.map(|(from, to)| writer.unroute(from, to)),
                 _ => None,
             };
             told.images.append(&mut writer.images);
             told.deeds.extend(deed);
-            self.after(&event);
+            self.after(&event, number);
         }
         told
     }
@@ -346,11 +359,12 @@ impl Mirror {
         }
     }
 
-    fn after(&mut self, event: &Event) {
+    fn after(&mut self, event: &Event, message: u64) {
         match event {
             Event::Deleted(node) => {
                 if let Some(number) = self.numbers.remove(node) {
                     self.by_number.remove(&number);
+                    self.pending_deletions.insert(number, message);
                 }
                 self.pending.retain(|field, _| field.node != *node);
                 self.pending_names.remove(node);

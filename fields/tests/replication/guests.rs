@@ -127,6 +127,26 @@ impl Shared {
     }
 
     fn frame(&mut self, dice: &mut Dice, applied: u64) {
+        self.publish();
+        if dice.below(10) == 0 {
+            self.restart();
+        }
+        self.mirror.follow(&self.replica, &mut self.copy, applied);
+    }
+
+    fn frame_after(&mut self, applied: u64) {
+        self.publish();
+        self.mirror.follow(&self.replica, &mut self.copy, applied);
+    }
+
+    /// The guest tells, the world hears, and the guest sees what came of it.
+    fn exchange(&mut self) {
+        self.tell();
+        self.hear(u64::MAX);
+        self.frame_after(self.messages);
+    }
+
+    fn publish(&mut self) {
         let bytes = self.publisher.frame(&self.world);
         let packet = Packet::read(&bytes).unwrap();
         for hash in packet.missing(&self.guest_bulk) {
@@ -134,14 +154,14 @@ impl Shared {
         }
         self.replica.apply(&packet, &self.guest_bulk).unwrap();
         assert!(self.replica.agrees());
-        if dice.below(10) == 0 {
-            // As after a gap.
-            let bytes = self.publisher.snapshot(&self.world).unwrap();
-            let packet = Packet::read(&bytes).unwrap();
-            self.replica = Replica::new(&packet, self.copy.types().clone(), &self.guest_bulk).unwrap();
-            self.mirror.restart();
-        }
-        self.mirror.follow(&self.replica, &mut self.copy, applied);
+    }
+
+    /// As after a gap.
+    fn restart(&mut self) {
+        let bytes = self.publisher.snapshot(&self.world).unwrap();
+        let packet = Packet::read(&bytes).unwrap();
+        self.replica = Replica::new(&packet, self.copy.types().clone(), &self.guest_bulk).unwrap();
+        self.mirror.restart();
     }
 
     fn check(&self) -> Result<(), TestCaseError> {
@@ -186,6 +206,65 @@ impl Shared {
         }
         Ok(())
     }
+}
+
+/// The guest's nodes `from` and `to`, which the world has.
+fn two_adders(shared: &mut Shared) -> [NodeId; 2] {
+    let pair = ["from", "to"].map(|name| {
+        let node = shared.copy.create("Adder").unwrap();
+        shared.copy.set_name(node, name).unwrap();
+        node
+    });
+    shared.exchange();
+    pair
+}
+
+#[test]
+fn what_a_route_brought_stays_when_its_source_is_gone() {
+    let mut shared = Shared::new();
+    let [from, to] = two_adders(&mut shared);
+    let field = |graph: &Graph, node: NodeId, name: &str| graph.field(node, name).unwrap();
+    let source = field(&shared.copy, from, "a");
+    shared.copy.set_value(source, Value::F64(3.0)).unwrap();
+    let target = field(&shared.copy, to, "b");
+    shared.copy.connect(source, target, Strength::Strong).unwrap();
+    shared.copy.delete(from).unwrap();
+    shared.exchange();
+    let theirs = shared.world.find("to").unwrap();
+    assert_eq!(shared.world.value_named(theirs, "b").unwrap(), Value::F64(3.0));
+    shared.check().unwrap();
+}
+
+#[test]
+fn what_was_deleted_here_does_not_come_back_before_the_world_hears_of_it() {
+    let mut shared = Shared::new();
+    let [from, _] = two_adders(&mut shared);
+    shared.copy.delete(from).unwrap();
+    shared.tell();
+    shared.restart();
+    shared.frame_after(shared.messages - 1);
+    assert_eq!(shared.copy.find("from"), None);
+    shared.exchange();
+    assert_eq!((shared.copy.find("from"), shared.world.find("from")), (None, None));
+    shared.check().unwrap();
+}
+
+#[test]
+fn what_the_world_keeps_comes_back() {
+    let mut shared = Shared::new();
+    let [from, to] = two_adders(&mut shared);
+    let ends = |graph: &Graph, from, to| (graph.field(from, "a").unwrap(), graph.field(to, "b").unwrap());
+    let (source, target) = ends(&shared.copy, from, to);
+    shared.copy.connect(source, target, Strength::Strong).unwrap();
+    shared.exchange();
+    shared.copy.delete(from).unwrap();
+    shared.tell();
+    shared.line.clear(); // refused
+    shared.frame_after(shared.messages);
+    let [from, to] = ["from", "to"].map(|name| shared.copy.find(name).unwrap());
+    let (source, target) = ends(&shared.copy, from, to);
+    assert!(shared.copy.route_between(source, target).is_some());
+    shared.check().unwrap();
 }
 
 proptest! {
