@@ -268,7 +268,7 @@ fn what_the_world_keeps_comes_back() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn what_a_guest_does_comes_to_be(seed in any::<[u8; 32]>(), hosts in any::<bool>()) {
