@@ -223,9 +223,6 @@ pub(crate) struct ShadowError {
     /// then 160x120 unless --size says otherwise
     #[arg(long, value_name = "PLACES", value_parser = clap::value_parser!(u32).range(1..), conflicts_with_all = ["truth", "trace_only", "penumbra"])]
     pub(crate) eyes: Option<u32>,
-    /// Casters that are cut out by alpha block light with whole triangles in the truth too, as shadow volumes have it
-    #[arg(long)]
-    pub(crate) whole_casters: bool,
     /// Score this mask against the truth instead of rendering: the tracer against another's
     #[arg(long, conflicts_with = "method")]
     pub(crate) trace_only: bool,

@@ -143,7 +143,6 @@ impl SceneJson {
             eps_scale: within("eps", self.eps.unwrap_or(defaults.eps_scale), 0.0, 1.0)?,
             cull: self.cull.unwrap_or(defaults.cull),
             blend_casts: self.blend_casts.unwrap_or(defaults.blend_casts),
-            whole_casters: defaults.whole_casters,
         };
         for side in self.size {
             within("size", side, 1, 1 << 15)?;

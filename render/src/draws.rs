@@ -56,6 +56,16 @@ pub(crate) struct Draw {
     pub(crate) count: u32,
 }
 
+/// What blocks light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Casting {
+    Nothing,
+    /// Its triangles.
+    Whole,
+    /// Its triangles without the holes that alpha cuts into them.
+    Holed,
+}
+
 /// What is known of one drawable.
 #[derive(Clone, Copy, Debug)]
 struct Slot {
@@ -64,7 +74,7 @@ struct Slot {
     kind: Kind,
     deformed: Option<u32>,
     drawn: bool,
-    casts: bool,
+    casting: Casting,
 }
 
 type Key = (Kind, u32, Option<u32>, u32);
@@ -90,6 +100,7 @@ pub(crate) struct Caster {
     pub(crate) index: usize,
     /// Mesh, material where that cuts holes, and revision of the deformation.
     pub(crate) content: [u64; 3],
+    pub(crate) has_holes: bool,
     pub(crate) world_from_object: Mat4,
     /// Middle of the mesh at rest, and how far it reaches from there, in the space of the object.
     pub(crate) centre: Vec3,
@@ -111,7 +122,7 @@ impl Draws {
     pub(crate) fn begin(&mut self, count: usize) {
         let kind =
             Kind { alpha: Alpha::Opaque, topology: 0, mirrored: false, double_sided: false, shader: 0, needs: Needs::default() };
-        let slot = Slot { mesh: NOTHING, material: NOTHING, kind, deformed: None, drawn: false, casts: false };
+        let slot = Slot { mesh: NOTHING, material: NOTHING, kind, deformed: None, drawn: false, casting: Casting::Nothing };
         if self.slots.len() != count {
             self.is_sorted = false;
         }
@@ -174,7 +185,16 @@ impl Draws {
         };
         let same = slot.drawn && (slot.mesh, slot.material, slot.deformed, slot.kind) == (mesh, material, deformed, kind);
         self.is_sorted &= same;
-        *slot = Slot { mesh, material, kind, deformed, drawn: true, casts: d.casts_shadow };
+        let has_holes = match gpu_material.alpha {
+            AlphaMode::Mask { cutoff } => gpu_material.least_alpha * gpu_mesh.least_alpha < cutoff,
+            _ => false,
+        };
+        let casting = match (d.casts_shadow, has_holes) {
+            (false, _) => Casting::Nothing,
+            (true, false) => Casting::Whole,
+            (true, true) => Casting::Holed,
+        };
+        *slot = Slot { mesh, material, kind, deformed, drawn: true, casting };
     }
 
     /// Sorts the frame's drawables into batches.
@@ -198,13 +218,13 @@ impl Draws {
     }
 
     /// Draws of all drawables in the frustum that pass `wanted`, and how many were outside.
-    pub(crate) fn cull(&mut self, planes: &Planes, wanted: impl Fn(Alpha, bool, u32) -> bool) -> (Vec<Draw>, usize) {
+    pub(crate) fn cull(&mut self, planes: &Planes, wanted: impl Fn(Alpha, Casting, u32) -> bool) -> (Vec<Draw>, usize) {
         let mut draws = Vec::new();
         let mut culled = 0;
         for (number, batch) in (0u32..).zip(&self.batches) {
             let first = self.visible.len() as u32;
             for (_, index) in &self.order[batch.first as usize..(batch.first + batch.count) as usize] {
-                if !wanted(batch.kind.alpha, self.slots[*index as usize].casts, *index) {
+                if !wanted(batch.kind.alpha, self.slots[*index as usize].casting, *index) {
                     continue;
                 }
                 if planes.may_see(&self.boxes[*index as usize]) {
@@ -267,18 +287,19 @@ impl Draws {
         (draws, culled)
     }
 
-    /// Numbers of the drawables that are drawn, with whether they cast.
-    pub(crate) fn drawn(&self) -> impl Iterator<Item = (usize, bool)> + '_ {
-        self.slots.iter().enumerate().filter(|(_, s)| s.drawn).map(|(i, s)| (i, s.casts))
+    /// Numbers of the drawables that are drawn, with what of them casts.
+    pub(crate) fn drawn(&self) -> impl Iterator<Item = (usize, Casting)> + '_ {
+        self.slots.iter().enumerate().filter(|(_, s)| s.drawn).map(|(i, s)| (i, s.casting))
     }
 
     /// All drawables that cast.
     pub(crate) fn casters(&self, drawables: &[Drawable], revision: impl Fn(u32) -> u64) -> Vec<Caster> {
-        let casting = self.slots.iter().zip(drawables).enumerate().filter(|(_, (s, _))| s.drawn && s.casts);
+        let casting = self.slots.iter().zip(drawables).enumerate().filter(|(_, (s, _))| s.drawn && s.casting != Casting::Nothing);
         let holes = |slot: &Slot| if slot.kind.alpha == Alpha::Mask { 1 + u64::from(slot.material) } else { 0 };
         let caster = |(i, (slot, d)): (usize, (&Slot, &Drawable))| Caster {
             index: i,
             content: [u64::from(slot.mesh), holes(slot), slot.deformed.map_or(0, &revision)],
+            has_holes: slot.casting == Casting::Holed,
             world_from_object: d.world_from_object,
             centre: d.mesh.bounds.centre(),
             reach: d.mesh.bounds.radius(),

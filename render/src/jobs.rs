@@ -2,7 +2,7 @@
 
 use crate::cache::{GpuMesh, Slab};
 use crate::deform::Deformer;
-use crate::draws::Draws;
+use crate::draws::{Casting, Draws};
 use crate::lights::Lights;
 use crate::plan::{BLACK_FILM, Purpose};
 use crate::slots::Slots;
@@ -30,7 +30,8 @@ pub(crate) fn jobs(
     for (place, &index) in lights.order.iter().enumerate().skip(lights.in_surface_pass) {
         let light = &scene.lights[index];
         let casters = if light.shadows == ShadowMethod::Volume {
-            draws.drawn().filter(|(_, casts)| *casts).filter_map(|(i, _)| caster(i)).collect()
+            let whole = draws.drawn().filter(|(_, casting)| *casting == Casting::Whole);
+            whole.filter_map(|(index, _)| caster(index)).collect()
         } else {
             let groups = scene.stencil_groups.iter().filter(|g| g.light == index && g.mode == StencilMode::Additive);
             let mut members: Vec<usize> = groups.flat_map(|g| g.casters.iter().copied()).collect();

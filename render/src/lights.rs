@@ -39,15 +39,20 @@ impl Lights {
     }
 }
 
-/// Does a light draw maps: for shapes in general, or for those that list it?
-pub(crate) fn draws_map(scene: &Scene, light: usize) -> bool {
+/// Does a light draw maps: for shapes in general, or for those that list it? Volumes leave to maps what has holes.
+pub(crate) fn draws_map(scene: &Scene, light: usize, any_caster_has_holes: bool) -> bool {
     let is_listed = || scene.receive_lists.iter().any(|list| list.contains(&light));
     is_sound(&scene.lights[light])
         && match scene.lights[light].shadows {
             ShadowMethod::Map => true,
             ShadowMethod::None => is_listed(),
-            ShadowMethod::Volume => false,
+            ShadowMethod::Volume => any_caster_has_holes && scene.lights[light].shines,
         }
+}
+
+/// Are a light's maps of casters with holes alone?
+pub(crate) fn maps_holes_only(light: &Light) -> bool {
+    light.shadows == ShadowMethod::Volume
 }
 
 /// Does the shadow of a light fall on a drawable?

@@ -4,7 +4,7 @@ use crate::cache::{GpuMaterial, GpuMesh, MaterialCache, Slab, make_mesh};
 use crate::clock::Clock;
 use crate::contours::Contours;
 use crate::deform::Deformer;
-use crate::draws::{Caches, Draw, Draws};
+use crate::draws::{Caches, Casting, Draw, Draws};
 use crate::layouts::Layouts;
 use crate::lighting::Lighting;
 use crate::lights::{Lights, draws_map};
@@ -205,7 +205,8 @@ impl Renderer {
         let around = surroundings::of(scene, pictures, &self.draws);
         let problems = &mut self.problems;
         let revision = |d| self.deformer.get(d).map_or(0, |d| d.revision);
-        let has_maps = (0..scene.lights.len()).any(|light| draws_map(scene, light));
+        let any_has_holes = self.draws.drawn().any(|(_, casting)| casting == Casting::Holed);
+        let has_maps = (0..scene.lights.len()).any(|light| draws_map(scene, light, any_has_holes));
         let casters = if has_maps { self.draws.casters(&scene.drawables, revision) } else { Vec::new() };
         let is_new = self.maps.choose(&self.gpu.device, scene, &around, casters, |message| problems.report(message));
         if is_new {

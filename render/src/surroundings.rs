@@ -1,15 +1,15 @@
 //! What shadow maps are fitted to: what all views see, and what casts.
 
 use crate::cull::{CentredBox, Planes};
-use crate::draws::Draws;
+use crate::draws::{Casting, Draws};
 use crate::maps::{Eye, Surroundings};
 use umbriel_scene::{Aabb, Picture, Scene};
 
 /// Looks at all views of the frame.
 pub(crate) fn of(scene: &Scene, pictures: &[Picture], draws: &Draws) -> Surroundings {
     let mut around = Surroundings { eyes: Vec::new(), receivers: Aabb::EMPTY, casters: Aabb::EMPTY };
-    for (index, casts) in draws.drawn() {
-        if casts {
+    for (index, casting) in draws.drawn() {
+        if casting != Casting::Nothing {
             around.casters = around.casters.union(scene.drawables[index].bounds_in_world);
         }
     }

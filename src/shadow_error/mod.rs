@@ -69,8 +69,6 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
         return Err(format!("{shown}: it casts no shadows; choose a --method").into());
     }
 
-    subject.options.whole_casters = args.whole_casters;
-
     if let Some(places) = args.eyes {
         // The eye comes as close as the near plane, where what rays start off their surfaces would be pixels.
         subject.options.eps_scale = subject.options.eps_scale.min(CLOSE);

@@ -38,7 +38,6 @@ pub(super) fn run(folder: &Path, args: &ShadowError) -> Result<usize, Failure> {
                 problems.insert(format!("{name}: {error}"));
             }
             Ok((mut subject, bounds)) => {
-                subject.options.whole_casters = args.whole_casters;
                 for light in lights(&bounds, method, args.map_size) {
                     let label = light.name.clone();
                     subject.scene.lights = vec![light];

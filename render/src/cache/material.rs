@@ -12,6 +12,8 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt};
 pub(crate) struct GpuMaterial {
     pub(crate) group: wgpu::BindGroup,
     pub(crate) alpha: AlphaMode,
+    /// The least that the material's own alpha comes to anywhere.
+    pub(crate) least_alpha: f32,
     pub(crate) double_sided: bool,
     /// Number of its shader; see [`crate::author`].
     pub(crate) shader: u32,
@@ -96,6 +98,7 @@ impl MaterialCache {
         GpuMaterial {
             group,
             alpha: material.alpha,
+            least_alpha: least_alpha(material),
             double_sided: material.double_sided,
             shader,
             needs,
@@ -124,6 +127,18 @@ impl MaterialCache {
         self.pictures.insert(key, Arc::downgrade(&picture));
         Ok(picture)
     }
+}
+
+/// Only looked for where it cuts holes. Layers may do anything to it.
+fn least_alpha(material: &Material) -> f32 {
+    if !matches!(material.alpha, AlphaMode::Mask { .. }) {
+        return 1.0;
+    }
+    if !material.layers.is_empty() {
+        return 0.0;
+    }
+    let texels = material.base_color_texture.iter().flat_map(|t| t.image.rgba.chunks_exact(4));
+    material.base_color.w * f32::from(texels.map(|texel| texel[3]).min().unwrap_or(u8::MAX)) / 255.0
 }
 
 fn slot_of(texture: &TextureRef) -> uniforms::Texture {

@@ -17,6 +17,8 @@ pub(crate) struct GpuMesh {
     pub(crate) index_count: u32,
     pub(crate) vertex_count: u32,
     pub(crate) topology: Topology,
+    /// Of the vertex colours.
+    pub(crate) least_alpha: f32,
     /// Skin and morph targets, where it has any.
     pub(crate) sources: Option<Sources>,
 }
@@ -81,6 +83,7 @@ pub(crate) fn make_mesh(device: &wgpu::Device, mesh: &Mesh) -> Result<GpuMesh, S
         index_count: mesh.indices.len() as u32,
         vertex_count: count as u32,
         topology: mesh.topology,
+        least_alpha: mesh.colors.iter().map(|c| c.w).fold(1.0, f32::min),
         sources: make_sources(device, mesh),
     })
 }

@@ -185,6 +185,7 @@ mod tests {
         let caster = |(index, m): (usize, &Mat4)| Caster {
             index,
             content: [1, 2, 0],
+            has_holes: false,
             world_from_object: *m,
             centre: Vec3::ZERO,
             reach: 1.0,

@@ -9,9 +9,9 @@ mod pipeline;
 mod share;
 
 use crate::clock::Clock;
-use crate::draws::{Caster, Draw, Draws, Kind};
+use crate::draws::{Caster, Casting, Draw, Draws, Kind};
 use crate::layouts::Layouts;
-use crate::lights::draws_map;
+use crate::lights::{draws_map, maps_holes_only};
 use crate::slots::Slots;
 use crate::stats::MapShare;
 use crate::uniforms;
@@ -38,6 +38,7 @@ pub(crate) struct Face {
     draws: Vec<Draw>,
     /// Has to be drawn in this frame.
     is_stale: bool,
+    holes_only: bool,
     /// Nothing casts into it: nobody asked for it yet.
     is_empty: bool,
 }
@@ -123,7 +124,8 @@ impl Maps {
         self.shares.clear();
         let limit = device.limits().max_texture_dimension_2d;
         let mut wanted: Vec<Wanted> = Vec::new();
-        for index in (0..scene.lights.len()).filter(|index| draws_map(scene, *index)) {
+        let any_has_holes = casters.iter().any(|c| c.has_holes);
+        for index in (0..scene.lights.len()).filter(|index| draws_map(scene, *index, any_has_holes)) {
             let light = &ranged(&scene.lights[index], around.casters);
             let size = light.map.size.clamp(1, limit);
             if size != light.map.size {
@@ -132,7 +134,9 @@ impl Maps {
             let fits = fits_of(light, size, around);
             let held = self.held.get(&index).filter(|h| !h.is_empty() && light.map.update == MapUpdate::Never);
             let is_same_kind = |h: &Held| std::mem::discriminant(&h.light.kind) == std::mem::discriminant(&light.kind);
-            let held = held.filter(|h| h.iter().all(|h| is_same_kind(h) && h.light.map.request == light.map.request));
+            let is_same_set = |h: &Held| maps_holes_only(&h.light) == maps_holes_only(light);
+            let held =
+                held.filter(|h| h.iter().all(|h| is_same_kind(h) && is_same_set(h) && h.light.map.request == light.map.request));
             let is_frozen = held.is_some_and(|h| light.kind == LightKind::Directional || h.len() == fits.len());
             let faces = held.filter(|_| is_frozen).map_or(fits.len(), Vec::len);
             let level = share::level(light, &around.eyes, self.levels.get(&index).copied());
@@ -144,17 +148,20 @@ impl Maps {
             return false;
         }
         let (tiles, is_new) = self.make_room(device, &wanted, scene.map_memory_bytes);
-        let snapshot = Arc::new(Snapshot { casters, radius: around.casters.radius() });
-        let mut motions: HashMap<*const Snapshot, Motion> = HashMap::new();
+        let radius = around.casters.radius();
+        let with_holes = casters.iter().filter(|c| c.has_holes).cloned().collect();
+        let snapshots = [casters, with_holes].map(|casters| Arc::new(Snapshot { casters, radius }));
+        let mut motions: HashMap<[*const Snapshot; 2], Motion> = HashMap::new();
         let mut old = std::mem::take(&mut self.held);
         for (wanted, tiles) in wanted.into_iter().zip(tiles) {
             let light = &ranged(&scene.lights[wanted.index], around.casters);
+            let snapshot = &snapshots[usize::from(maps_holes_only(light))];
             let old = old.remove(&wanted.index).unwrap_or_default();
             for held in &old {
-                let motion = || keep::motion(&held.snapshot, &snapshot);
-                motions.entry(Arc::as_ptr(&held.snapshot)).or_insert_with(motion);
+                let motion = || keep::motion(&held.snapshot, snapshot);
+                motions.entry([&held.snapshot, snapshot].map(Arc::as_ptr)).or_insert_with(motion);
             }
-            let mut held = self.faces_of_light(light, &wanted, &tiles, &old, &motions, &snapshot, around);
+            let mut held = self.faces_of_light(light, &wanted, &tiles, &old, &motions, snapshot, around);
             if is_new {
                 self.faces.iter_mut().filter(|f| f.light == wanted.index).for_each(|f| f.is_stale = true);
                 held.iter_mut().for_each(|h| h.snapshot = snapshot.clone());
@@ -180,14 +187,14 @@ impl Maps {
         wanted: &Wanted,
         tiles: &[(u32, atlas::Place)],
         old: &[Held],
-        motions: &HashMap<*const Snapshot, Motion>,
+        motions: &HashMap<[*const Snapshot; 2], Motion>,
         snapshot: &Arc<Snapshot>,
         around: &Surroundings,
     ) -> Vec<Held> {
         let side = tiles.first().map_or(wanted.demand.size, |t| t.0);
         let smaller = (side != wanted.demand.size).then(|| fits_of(light, side, around));
         let fits = smaller.filter(|f| f.len() == wanted.fits.len()).unwrap_or_else(|| wanted.fits.clone());
-        let motion_of = |held: &Held| &motions[&Arc::as_ptr(&held.snapshot)];
+        let motion_of = |held: &Held| &motions[&[&held.snapshot, snapshot].map(Arc::as_ptr)];
         let is_same_set = old.len() == fits.len();
         let carry = |(held, fit): (&Held, &Fit)| held.carried(light, fit, &motion_of(held).new_from_old);
         let mut carried: Vec<Option<Fit>> = old.iter().zip(&fits).map(carry).collect();
@@ -221,7 +228,18 @@ impl Maps {
             let waits = light.map.update == MapUpdate::Never && light.map.request == Some(0);
             let is_empty = waits && held.is_none_or(|h| h.is_empty);
             let (index, draws) = (wanted.index, Vec::new());
-            self.faces.push(Face { light: index, projection, size: tile.0, place, slot: 0, draws, is_stale, is_empty });
+            let holes_only = maps_holes_only(light);
+            self.faces.push(Face {
+                light: index,
+                projection,
+                size: tile.0,
+                place,
+                slot: 0,
+                draws,
+                is_stale,
+                holes_only,
+                is_empty,
+            });
             all.push(match held.filter(|_| !is_stale) {
                 // A map that moved along stays as old as it is: deviations do not add up.
                 Some(held) if motion_of(held).is_exact && !wanted.is_frozen => {
@@ -286,7 +304,9 @@ impl Maps {
                 continue;
             }
             let planes = Planes::new(&map_from_world);
-            face.draws = draws.cull(&planes, |_, casts, _| casts).0;
+            let holes_only = face.holes_only;
+            face.draws =
+                draws.cull(&planes, |_, casting, _| casting == Casting::Holed || casting == Casting::Whole && !holes_only).0;
             for draw in &face.draws {
                 let key = pipeline::key_of(&draws.batches[draw.batch as usize].kind);
                 self.pipelines.entry(key).or_insert_with(|| pipeline::of_kind(device, &self.module, &self.layout, key));

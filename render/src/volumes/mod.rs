@@ -13,7 +13,7 @@
 //! exact, and so is a surface that lies over itself more often, which is cut apart. What remains is a mesh of more than 8128
 //! layers, see [`VolumeStats::may_wrap`].
 //!
-//! Alpha-tested casters throw the shadow of their whole triangles.
+//! Casters throw the shadow of their whole triangles. Those that alpha cuts holes into are left to maps where a light casts by volume.
 //!
 //! This module knows nothing of lighting, materials or how the stencil is used afterwards.
 

@@ -185,6 +185,42 @@ fn bias_tunes_itself() {
     assert!(failed.is_empty(), "{failed:?}");
 }
 
+/// Lights that cast by volume draw maps of what alpha cuts holes into, and of nothing else.
+#[test]
+fn holes_are_left_to_maps() {
+    let by_volume = |light: Light| Light { shadows: ShadowMethod::Volume, ..light };
+    let lights = [
+        ("sun", by_volume(sun(Vec3::new(0.4, -1.0, -0.3)))),
+        ("bulb", by_volume(Light { kind: LightKind::Point, position: Vec3::new(1.0, 5.0, 1.5), ..noon() })),
+    ];
+    for (name, light) in lights {
+        let mut scene = Scene { drawables: forest(), lights: vec![light], ..Default::default() };
+        let (away, score) = scored(&format!("holes_{name}"), &scene, [[2.5, 5.0, 6.0], [0.3, 0.0, 0.0]], Vec3::ZERO);
+        assert!(away.dark < 0.0002 && away.lit < 0.0002 && score.iou > 0.98, "{name}");
+
+        let (_turn, gpu) = gpu();
+        let mut renderer = umbriel_render::Renderer::new(gpu).unwrap();
+        let view = look("holes", Vec3::new(2.5, 5.0, 6.0), Vec3::ZERO, [64, 48]);
+        let mut redraws = |scene: &Scene| {
+            let stats = renderer.render(scene, &[Picture::mono(view.clone())]).unwrap();
+            (stats.maps > 0, stats.map_redraws > 0)
+        };
+        assert_eq!([redraws(&scene), redraws(&scene)], [(true, true), (true, false)], "{name}");
+        let post = scene.drawables.len() - 1;
+        for (moved, is_drawn_anew) in [(post, false), (1, true)] {
+            let d = &mut scene.drawables[moved];
+            let by = Mat4::from_translation(Vec3::X * 0.1);
+            (d.world_from_object, d.bounds_in_world) = (by * d.world_from_object, d.bounds_in_world.transformed(&by));
+            assert_eq!(redraws(&scene), (true, is_drawn_anew), "{name}: {moved} moved");
+        }
+        // A mask that cuts nothing off leaves triangles whole.
+        for d in &mut scene.drawables {
+            std::sync::Arc::make_mut(&mut d.material).base_color_texture = None;
+        }
+        assert_eq!(redraws(&scene), (false, false), "{name}: without holes");
+    }
+}
+
 /// How much of the light is wrong, in penumbrae and everywhere, by filter.
 #[test]
 fn penumbrae_follow_from_the_size_of_the_light() {

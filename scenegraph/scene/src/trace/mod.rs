@@ -36,13 +36,11 @@ pub struct TraceOptions {
     pub cull: bool,
     /// Surfaces with alpha mode blend, which the eye does not see here, cast shadows.
     pub blend_casts: bool,
-    /// Casters that are cut out by alpha block light with the whole of their triangles, as shadow volumes have it.
-    pub whole_casters: bool,
 }
 
 impl Default for TraceOptions {
     fn default() -> TraceOptions {
-        TraceOptions { sub_samples: 4, graze: 0.03, eps_scale: 1e-5, cull: true, blend_casts: true, whole_casters: false }
+        TraceOptions { sub_samples: 4, graze: 0.03, eps_scale: 1e-5, cull: true, blend_casts: true }
     }
 }
 
@@ -169,7 +167,7 @@ impl Tracer {
     fn is_blocked(&self, ray: &Ray, far: f64, options: &TraceOptions) -> bool {
         self.soup.any(ray, far, |hit| {
             let shape = &self.soup.shapes[self.soup.triangles[hit.triangle].shape as usize];
-            shape.casts && (options.blend_casts || !shape.blend) && (options.whole_casters || self.soup.is_there(hit))
+            shape.casts && (options.blend_casts || !shape.blend) && self.soup.is_there(hit)
         })
     }
 }
