@@ -31,8 +31,17 @@ pub fn canonical(name: &str) -> String {
 /// The known name that is most like the given one, if any is alike at all.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let name = canonical(name);
+    let words = |name: &str| {
+        let mut words: Vec<String> = name.split('_').map(str::to_owned).collect();
+        words.sort_unstable();
+        words
+    };
+    let name_words = words(&name);
     let alike = |candidate: &str| {
         let candidate = canonical(candidate);
+        if words(&candidate) == name_words {
+            return Some(1.0);
+        }
         let likeness = strsim::jaro_winkler(&name, &candidate);
         // Short names share their letters with any long one: half of the longer must be there, or all of the shorter in a row.
         let longer = name.chars().count().max(candidate.chars().count());
@@ -79,11 +88,12 @@ mod tests {
 
     #[test]
     fn a_typing_error_finds_its_name() {
-        let known = ["translation", "rotation", "scale", "center"];
+        let known = ["translation", "rotation", "scale", "center", "route", "weak_route"];
         for (written, expected) in [
             ("transaltion", Some("translation")),
             ("Rotaton", Some("rotation")),
             ("centre", Some("center")),
+            ("route_weak", Some("weak_route")),
             ("zzz", None),
             ("tan", None),
         ] {
