@@ -3,7 +3,6 @@
 use crate::buffer::GrowBuffer;
 use crate::draws::Draws;
 use crate::layouts::Layouts;
-use crate::lights::{self, Lights};
 use crate::maps::Maps;
 use crate::projection::ProjectionLists;
 use crate::uniforms;
@@ -52,7 +51,7 @@ impl Lighting {
         queue: &wgpu::Queue,
         layouts: &Layouts,
         scene: &Scene,
-        lights: &Lights,
+        (light_count, lights): (usize, &[uniforms::Light]),
         maps: &Maps,
         draws: &Draws,
         lists: &ProjectionLists,
@@ -60,10 +59,9 @@ impl Lighting {
         if self.instances.write(device, queue, bytemuck::cast_slice(&draws.instances)) {
             self.instances_group = None;
         }
-        let list: Vec<uniforms::Light> = lights.all().map(|i| lights::uniform_of(&scene.lights[i], maps.faces_of(i))).collect();
-        let frame = frame_of(scene, lights.order.len(), lists.receive_words);
+        let frame = frame_of(scene, light_count, lists.receive_words);
         let mut grown = self.frame.write(device, queue, bytemuck::bytes_of(&frame));
-        grown |= self.lights.write(device, queue, bytemuck::cast_slice(&list));
+        grown |= self.lights.write(device, queue, bytemuck::cast_slice(lights));
         grown |= self.faces.write(device, queue, bytemuck::cast_slice(&maps.uniforms()));
         grown |= self.receive.write(device, queue, bytemuck::cast_slice(&lists.receive));
         grown |= self.projectors.write(device, queue, bytemuck::cast_slice(&lists.projectors));

@@ -85,6 +85,8 @@ pub(crate) const BLACK_FILM: usize = 0;
 pub(crate) struct Frame<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) lights: &'a Lights,
+    /// The same as the shaders read them.
+    pub(crate) light_uniforms: &'a [uniforms::Light],
     pub(crate) purposes: &'a [Purpose],
     /// The soft ones among them.
     pub(crate) soft: &'a [Option<SoftJob>],
@@ -184,6 +186,10 @@ pub(crate) fn plan_picture(
         let mut slot_with = |first: usize, count: usize| {
             uniform.first_light = first as u32;
             uniform.light_count = count as u32;
+            uniform.lights = bytemuck::Zeroable::zeroed();
+            for (place, light) in uniform.lights.iter_mut().zip(&frame.light_uniforms[first..first + count]) {
+                *place = *light;
+            }
             uniform.shown_light = shown.unwrap_or(0) as u32;
             slots.push(&uniform)
         };
@@ -305,5 +311,6 @@ fn uniform_of(view: &View, rect: Rect, scene: &Scene) -> uniforms::View {
             Samples::Four => [-0.125, -0.375],
         },
         spare: [0; 2],
+        lights: bytemuck::Zeroable::zeroed(),
     }
 }

@@ -7,7 +7,7 @@ use crate::deform::Deformer;
 use crate::draws::{Caches, Casting, Draw, Draws};
 use crate::layouts::Layouts;
 use crate::lighting::Lighting;
-use crate::lights::{Lights, draws_map};
+use crate::lights::{self, Lights, draws_map};
 use crate::maps::Maps;
 use crate::plan::{self, ViewPlan};
 use crate::projection::{self, ProjectionLists};
@@ -126,10 +126,25 @@ impl Renderer {
         let seen = (&self.draws, &self.meshes, &self.deformer);
         self.contours.prepare((&self.gpu.device, &self.gpu.queue), scene, seen, &mut self.volumes);
         let contours = self.contours.places();
-        let frame = plan::Frame { scene, lights: &lights, purposes: &purposes, soft: &soft, contours: &contours };
+        let light_uniforms: Vec<uniforms::Light> =
+            lights.all().map(|i| lights::uniform_of(&scene.lights[i], self.maps.faces_of(i))).collect();
+        self.surface.set_frame(FrameNeeds::new(
+            scene,
+            &light_uniforms[..lights.order.len()],
+            &lights,
+            !self.maps.faces.is_empty(),
+        ));
+        let frame = plan::Frame {
+            scene,
+            lights: &lights,
+            light_uniforms: &light_uniforms,
+            purposes: &purposes,
+            soft: &soft,
+            contours: &contours,
+        };
         let (plans, sheets) = self.plan_views(pictures, &frame, &mut stats);
         let lists = projection::lists(scene, pictures, &lights, &self.maps, casters);
-        self.upload(scene, &lights, &lists);
+        self.upload(scene, (lights.order.len(), &light_uniforms), &lists);
         let prepared = Instant::now();
 
         self.record((&plans, &sheets), (&jobs, &soft), &mut stats);
@@ -219,8 +234,6 @@ impl Renderer {
     fn plan_views(&mut self, pictures: &[Picture], frame: &plan::Frame<'_>, stats: &mut FrameStats) -> (Vec<ViewPlan>, Sheets) {
         let device = &self.gpu.device;
         let limit = device.limits().max_texture_dimension_2d;
-        let has_fog = frame.scene.fog.is_some_and(|f| f.visibility_range > 0.0);
-        self.surface.set_frame(FrameNeeds { maps: !self.maps.faces.is_empty(), fog: has_fog });
         let (mut plans, mut sheets) = (Vec::new(), Sheets::default());
         self.targets.resize_with(pictures.len(), || None);
         for (number, picture) in pictures.iter().enumerate() {
@@ -266,7 +279,7 @@ impl Renderer {
     }
 
     /// Sends the frame's lists to the GPU.
-    fn upload(&mut self, scene: &Scene, lights: &Lights, lists: &ProjectionLists) {
+    fn upload(&mut self, scene: &Scene, lights: (usize, &[uniforms::Light]), lists: &ProjectionLists) {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         self.views.upload(device, queue, &self.layouts.view);
         self.films.upload(device, queue, &self.layouts.film);

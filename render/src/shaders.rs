@@ -158,7 +158,7 @@ mod tests {
     fn structs_are_laid_out_alike() {
         for Ours(shader, name, size, fields) in [
             ours!("surface", "View", uniforms::View, clip_from_world world_from_clip view_from_world eye_in_world viewport window
-                first_light light_count exposure shown_light first_sample),
+                first_light light_count exposure shown_light first_sample lights),
             ours!("surface", "Instance", uniforms::Instance, world_from_object world_from_object_normal flags),
             ours!("surface", "Texture", uniforms::Texture, linear offset uv_set present),
             ours!("surface", "Material", uniforms::Material, base_color emissive alpha_cutoff specular exponent metallic

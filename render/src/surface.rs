@@ -5,9 +5,10 @@ use crate::cache::VERTEX_BUFFERS;
 use crate::draws::{Alpha, Kind, Needs};
 use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT};
 use crate::layouts::Layouts;
-use crate::shaders;
+use crate::lights::Lights;
+use crate::{shaders, uniforms};
 use std::collections::HashMap;
-use umbriel_scene::{Material, Samples};
+use umbriel_scene::{FogKind, Material, Samples, Scene};
 
 /// What a pass over the surfaces does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -55,11 +56,57 @@ impl Pass {
 }
 
 /// What all surfaces of a frame need of their shader.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct FrameNeeds {
     /// Some light has maps.
-    pub(crate) maps: bool,
-    pub(crate) fog: bool,
+    maps: bool,
+    /// Some light shines from a position.
+    lamps: bool,
+    /// Some light adds to what comes from everywhere.
+    ambients: bool,
+    /// Some surface lists the lights whose shadows fall on it.
+    lists: bool,
+    /// As the shader's constant: none, linear, exponential.
+    fog: u8,
+    /// Lights that the surface pass adds up, and all of them; at most [`ANY_NUMBER`].
+    lights: [u8; 2],
+}
+
+/// More lights than a view holds.
+const ANY_NUMBER: u8 = uniforms::View::LIGHTS as u8 + 1;
+
+impl FrameNeeds {
+    /// `uniforms` are of the lights that shine.
+    pub(crate) fn new(scene: &Scene, uniforms: &[uniforms::Light], lights: &Lights, maps: bool) -> FrameNeeds {
+        let number = |count: usize| count.min(usize::from(ANY_NUMBER)) as u8;
+        FrameNeeds {
+            maps,
+            lamps: uniforms.iter().any(|l| l.kind != 0),
+            ambients: uniforms.iter().any(|l| l.ambient.iter().any(|a| *a > 0.0)),
+            lists: !scene.receive_lists.is_empty(),
+            fog: match scene.fog.filter(|f| f.visibility_range > 0.0).map(|f| f.kind) {
+                None => 0,
+                Some(FogKind::Linear) => 1,
+                Some(FogKind::Exponential) => 2,
+            },
+            lights: [lights.in_surface_pass, uniforms.len()].map(number),
+        }
+    }
+
+    /// What is left of it for one pass, with the number of lights that it adds up.
+    fn of(self, pass: Pass, kind: Kind) -> (FrameNeeds, u8) {
+        let [in_surface_pass, all] = self.lights;
+        let rest = FrameNeeds { lights: [0; 2], ..self };
+        match pass {
+            Pass::Depth | Pass::Mark | Pass::Exempt if kind.alpha != Alpha::Mask => (FrameNeeds::default(), 0),
+            Pass::Base | Pass::BaseInShadow => (rest, in_surface_pass),
+            Pass::BaseLit => (rest, ANY_NUMBER.min(in_surface_pass + 1)),
+            Pass::Blend => (rest, all),
+            Pass::Add | Pass::AddSoft | Pass::AddInShadow => (rest, 1),
+            Pass::Depth | Pass::Mark | Pass::Exempt => (rest, 0),
+            Pass::Visibility | Pass::VisibilityAdd | Pass::VisibilitySoft => (rest, 0),
+        }
+    }
 }
 
 /// Pipelines by pass and kind of drawable. Each holds of the shader only what its drawables and the frame need: devices
@@ -72,7 +119,7 @@ pub(crate) struct Surface {
     authors: Authors,
     samples: Samples,
     frame: FrameNeeds,
-    pipelines: HashMap<(Pass, Kind, FrameNeeds), wgpu::RenderPipeline>,
+    pipelines: HashMap<(Pass, Kind, (FrameNeeds, u8)), wgpu::RenderPipeline>,
 }
 
 impl Surface {
@@ -92,7 +139,7 @@ impl Surface {
             soft_layout,
             authors: Authors::default(),
             samples,
-            frame: FrameNeeds { maps: true, fog: true },
+            frame: FrameNeeds::default(),
             pipelines: HashMap::new(),
         }
     }
@@ -114,12 +161,14 @@ impl Surface {
         let module = self.authors.get(kind.shader).map_or(&self.module, |author| &author.module);
         let is_soft = matches!(pass, Pass::AddSoft | Pass::VisibilitySoft);
         let layout = if is_soft { &self.soft_layout } else { &self.layout };
-        let make = || pipeline(device, (module, layout), pass, (kind, self.frame), self.samples);
-        self.pipelines.entry((pass, kind, self.frame)).or_insert_with(make);
+        let needs = self.frame.of(pass, kind);
+        let make = || pipeline(device, (module, layout), pass, (kind, needs), self.samples);
+        self.pipelines.entry((pass, kind, needs)).or_insert_with(make);
     }
 
     pub(crate) fn get(&self, pass: Pass, kind: Kind) -> Option<&wgpu::RenderPipeline> {
-        self.pipelines.get(&(pass, pass.seen(kind), self.frame))
+        let kind = pass.seen(kind);
+        self.pipelines.get(&(pass, kind, self.frame.of(pass, kind)))
     }
 
     /// Number of the shader that an author wrote for a material.
@@ -159,7 +208,7 @@ fn pipeline(
     device: &wgpu::Device,
     (module, layout): (&wgpu::ShaderModule, &wgpu::PipelineLayout),
     pass: Pass,
-    (kind, frame): (Kind, FrameNeeds),
+    (kind, (frame, lights)): (Kind, (FrameNeeds, u8)),
     samples: Samples,
 ) -> wgpu::RenderPipeline {
     let entry = match (pass, kind.alpha) {
@@ -203,7 +252,11 @@ fn pipeline(
         ("LAYERS", f64::from(kind.needs.layers)),
         ("SHADING", f64::from(kind.needs.shading)),
         ("MAPS", f64::from(u8::from(frame.maps))),
-        ("FOG", f64::from(u8::from(frame.fog))),
+        ("LAMPS", f64::from(u8::from(frame.lamps))),
+        ("AMBIENTS", f64::from(u8::from(frame.ambients))),
+        ("LISTS", f64::from(u8::from(frame.lists))),
+        ("FOG", f64::from(frame.fog)),
+        ("LIGHTS", f64::from(lights)),
     ];
     let compilation_options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -211,7 +264,7 @@ fn pipeline(
         layout: Some(layout),
         vertex: wgpu::VertexState {
             module,
-            entry_point: Some("vertex"),
+            entry_point: Some(if entry == "nothing" { "solid" } else { "vertex" }),
             compilation_options: compilation_options.clone(),
             buffers: &VERTEX_BUFFERS,
         },

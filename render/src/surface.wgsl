@@ -23,6 +23,12 @@ struct Fragment {
     @location(6) @interpolate(flat) flags: u32,
 };
 
+// For passes that write depth or stencil alone.
+@vertex
+fn solid(@location(0) position: vec3<f32>, @location(6) instance: u32) -> @builtin(position) @invariant vec4<f32> {
+    return clip_from_point(view.clip_from_world, world_from_vertex(instances[instance].world_from_object, position));
+}
+
 @vertex
 fn vertex(v: Vertex) -> Fragment {
     let instance = instances[v.instance];
@@ -126,29 +132,41 @@ fn bumped(f: Fragment, n: vec3<f32>, across: vec3<f32>, down: vec3<f32>) -> vec3
 // than maps let through, `flags` are the instance's.
 fn reflected(s: Surface, flags: u32, shadow: f32) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
-    for (var i = 0u; i < view.light_count; i++) {
-        let number = view.first_light + i;
-        let light = lights[number];
-        let in_ = incidence(light, s.position);
-        if in_.strength <= 0.0 {
-            continue;
+    if LIGHTS > LIGHTS_OF_VIEW {
+        for (var i = 0u; i < view.light_count; i++) {
+            let number = view.first_light + i;
+            sum += reflected_of(lights[number], number, s, flags, shadow);
         }
-        let casts = casts_on(light, number, flags);
-        // Of a light that the surface lists, all is shadowed.
-        let takes_ambient = casts && lists_lights(flags);
-        var share = shadow;
-        if MAPS && light.face_count > 0u && casts {
-            // What faces away stands in its own shadow.
-            var lit = 0.0;
-            if dot(s.normal, in_.towards) > 0.0 {
-                lit = map_visibility(light, s.position, s.face_normal);
-            }
-            share *= 1.0 - light.shadow_intensity * (1.0 - lit);
+        return sum;
+    }
+    if LIGHTS > 0u {
+        sum += reflected_of(view.lights[0], view.first_light, s, flags, shadow);
+    }
+    if LIGHTS > 1u {
+        sum += reflected_of(view.lights[1], view.first_light + 1u, s, flags, shadow);
+    }
+    return sum;
+}
+
+// The same of the numbered light.
+fn reflected_of(light: Light, number: u32, s: Surface, flags: u32, shadow: f32) -> vec3<f32> {
+    let in_ = incidence(light, s.position);
+    if in_.strength <= 0.0 {
+        return vec3<f32>(0.0);
+    }
+    var share = shadow;
+    if MAPS && light.face_count > 0u && casts_on(light, number, flags) {
+        // What faces away stands in its own shadow.
+        var lit = 0.0;
+        if dot(s.normal, in_.towards) > 0.0 {
+            lit = map_visibility(light, s.position, s.face_normal);
         }
-        sum += shade(s, LightSample(in_.towards, light.color * in_.strength, share, light.kind));
-        if takes_ambient {
-            sum += ambient(s, light.ambient * in_.strength * share);
-        }
+        share *= 1.0 - light.shadow_intensity * (1.0 - lit);
+    }
+    let sum = shade(s, LightSample(in_.towards, light.color * in_.strength, share, light.kind));
+    // Of a light that the surface lists, all is shadowed.
+    if AMBIENTS && lists_lights(flags) && casts_on(light, number, flags) {
+        return sum + ambient(s, light.ambient * in_.strength * share);
     }
     return sum;
 }
@@ -156,11 +174,13 @@ fn reflected(s: Surface, flags: u32, shadow: f32) -> vec3<f32> {
 // Light that reaches the place from everywhere.
 fn ambient_light(s: Surface, flags: u32) -> vec3<f32> {
     var sum = frame.ambient.rgb;
-    for (var i = 0u; i < frame.light_count; i++) {
-        let light = lights[i];
-        let is_shadowed = lists_lights(flags) && casts_on(light, i, flags);
-        if any(light.ambient > vec3<f32>(0.0)) && !is_shadowed {
-            sum += light.ambient * incidence(light, s.position).strength;
+    if AMBIENTS {
+        for (var i = 0u; i < frame.light_count; i++) {
+            let light = lights[i];
+            let is_shadowed = lists_lights(flags) && casts_on(light, i, flags);
+            if any(light.ambient > vec3<f32>(0.0)) && !is_shadowed {
+                sum += light.ambient * incidence(light, s.position).strength;
+            }
         }
     }
     return ambient(s, sum);
@@ -219,7 +239,7 @@ fn added(f: Fragment) -> @location(0) vec4<f32> {
 // The same where the light's shadow volumes are, for shapes whose own shader may make something of the shadow.
 @fragment
 fn added_in_shadow(f: Fragment) -> @location(0) vec4<f32> {
-    return addition(f, 1.0 - lights[view.first_light].shadow_intensity);
+    return addition(f, 1.0 - view.lights[0].shadow_intensity);
 }
 
 // Share of one light that a map lets through. Cone, distance and orientation do not count.
@@ -254,7 +274,7 @@ fn shown_share(f: Fragment) -> f32 {
 // The view's one light, to be added to what is there, as far as its shadow texture shows it.
 @fragment
 fn added_soft(f: Fragment) -> @location(0) vec4<f32> {
-    let shown = 1.0 - lights[view.first_light].shadow_intensity * (1.0 - shown_share(f));
+    let shown = 1.0 - view.lights[0].shadow_intensity * (1.0 - shown_share(f));
     return addition(f, shown);
 }
 

@@ -18,6 +18,13 @@ pub(crate) struct View {
     pub(crate) shown_light: u32,
     pub(crate) first_sample: [f32; 2],
     pub(crate) spare: [u32; 2],
+    /// The first ones of its range of lights.
+    pub(crate) lights: [Light; View::LIGHTS],
+}
+
+impl View {
+    /// How many lights it holds.
+    pub(crate) const LIGHTS: usize = 2;
 }
 
 /// `Instance` of shaders/instance.wgsl.
@@ -102,7 +109,7 @@ pub(crate) struct Texture {
     pub(crate) present: u32,
 }
 
-/// `Light` of shaders/light.wgsl.
+/// `Light` of shaders/view.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Light {

@@ -171,15 +171,22 @@ fn material_numbers(material: &Material) -> Vec<f32> {
 }
 
 /// The view whose place in the sheet starts at `left`.
-pub(crate) fn view(device: &Device, layouts: &Layouts, view: &View, left: u32) -> BindGroup {
+pub(crate) fn view(
+    device: &Device,
+    layouts: &Layouts,
+    (view, left): (&View, u32),
+    light: &Light,
+    map: Option<&LightMap>,
+) -> BindGroup {
     let clip_from_world = view.frustum.clip_from_view() * view.view_from_world;
     let eye = view.view_from_world.inverse().w_axis;
-    view_group(device, layouts, [clip_from_world, view.view_from_world], eye, (left, view.size))
+    let light = light_numbers(light, map);
+    view_group(device, layouts, [clip_from_world, view.view_from_world], eye, (left, view.size), &light)
 }
 
 /// The light's map as a view.
 pub(crate) fn map_view(device: &Device, layouts: &Layouts, map: &LightMap) -> BindGroup {
-    view_group(device, layouts, [map.map_from_world; 2], map.towards_light.extend(0.0), (0, [map.size; 2]))
+    view_group(device, layouts, [map.map_from_world; 2], map.towards_light.extend(0.0), (0, [map.size; 2]), &[0.0; 32])
 }
 
 fn view_group(
@@ -188,6 +195,7 @@ fn view_group(
     [clip_from_world, view_from_world]: [Mat4; 2],
     eye: Vec4,
     (left, size): (u32, [u32; 2]),
+    light: &[f32],
 ) -> BindGroup {
     let mut numbers: Vec<f32> = Vec::new();
     for m in [clip_from_world, clip_from_world.inverse(), view_from_world] {
@@ -199,6 +207,9 @@ fn view_group(
     // One light from the first on, at exposure 1; none is shown alone.
     numbers.extend([f32::from_bits(0), f32::from_bits(1), 1.0, f32::from_bits(0)]);
     numbers.extend([-0.125, -0.375, 0.0, 0.0]);
+    // That light, and no second one.
+    numbers.extend(light);
+    numbers.extend([0.0; 32]);
     let buffer = init(device, &numbers, BufferUsages::UNIFORM);
     group(device, &layouts.view, &[buffer.as_entire_binding()])
 }
@@ -241,13 +252,7 @@ pub(crate) fn lighting(
     // No fog, one light.
     frame.extend([0.0, 0.0, 0.0, 0.0, 0.0, f32::from_bits(1), 0.0, 0.0]);
     frame.extend(Mat4::IDENTITY.to_cols_array());
-    let Light { direction: d, color, intensity, .. } = &scene.lights[0];
-    let c = *color * *intensity;
-    let count = f32::from_bits(u32::from(map.is_some()));
-    let mut light = vec![0.0, 0.0, 0.0, 0.0, d.x, d.y, d.z, f32::MAX, c.x, c.y, c.z, 1.0];
-    light.extend([0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.5]);
-    // Faces, four texels of filter, bias that tunes itself, flags and size.
-    light.extend([0.0, count, 4.0, -1.0, -1.0, 0.0, Light::SUN_SIZE, count]);
+    let light = light_numbers(&scene.lights[0], map);
     let mut faces = vec![0.0f32; 48];
     if let Some(map) = map {
         faces = [map.map_from_world.to_cols_array(), map.map_from_world.inverse().to_cols_array()].concat();
@@ -271,6 +276,18 @@ pub(crate) fn lighting(
         nothing.as_entire_binding(),
     ];
     group(device, &layouts.lighting, &resources)
+}
+
+/// A directional light as the shaders read it.
+fn light_numbers(light: &Light, map: Option<&LightMap>) -> Vec<f32> {
+    let Light { direction: d, color, intensity, .. } = light;
+    let c = *color * *intensity;
+    let count = f32::from_bits(u32::from(map.is_some()));
+    let mut numbers = vec![0.0, 0.0, 0.0, 0.0, d.x, d.y, d.z, f32::MAX, c.x, c.y, c.z, 1.0];
+    numbers.extend([0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.5]);
+    // Faces, four texels of filter, bias that tunes itself, flags and size.
+    numbers.extend([0.0, count, 4.0, -1.0, -1.0, 0.0, Light::SUN_SIZE, count]);
+    numbers
 }
 
 pub(crate) fn group(device: &Device, layout: &BindGroupLayout, resources: &[BindingResource<'_>]) -> BindGroup {

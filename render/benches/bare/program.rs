@@ -61,7 +61,7 @@ impl Program {
         let eyes = (0..).zip(views).map(|(number, view)| {
             let left = number * size[0];
             let picture = texture(device, size, PICTURE, 1, TextureUsages::COPY_SRC);
-            let group = bindings::view(device, &layouts, view, left);
+            let group = bindings::view(device, &layouts, (view, left), &scene.lights[0], map.as_ref());
             Eye { group, left, size, target: picture.create_view(&Default::default()), picture }
         });
         Program {

@@ -14,7 +14,8 @@ fn metallic_roughness_brdf(s: Surface, towards: vec3<f32>) -> vec3<f32> {
     let d = n_h * n_h * (a2 - 1.0) + 1.0;
     let distribution = a2 / (PI * d * d);
     let visibility = 0.5 / (n_l * sqrt(n_v * n_v * (1.0 - a2) + a2) + n_v * sqrt(n_l * n_l * (1.0 - a2) + a2) + 1e-7);
-    let grazing = pow(1.0 - v_h, 5.0);
+    let away = 1.0 - v_h;
+    let grazing = away * away * (away * away) * away;
     let f_dielectric = mix(0.04, 1.0, grazing);
     let f_metal = mix(base_color, vec3<f32>(1.0), grazing);
     let specular = distribution * visibility;

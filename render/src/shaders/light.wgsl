@@ -15,33 +15,6 @@ struct Frame {
     world_from_room: mat4x4<f32>,
 };
 
-struct Light {
-    position: vec3<f32>,
-    kind: u32,
-    direction: vec3<f32>,
-    range: f32,
-    // Times intensity.
-    color: vec3<f32>,
-    shadow_intensity: f32,
-    ambient: vec3<f32>,
-    cos_outer: f32,
-    attenuation: vec3<f32>,
-    // 1 / (cos_inner - cos_outer)
-    cone_scale: f32,
-    first_face: u32,
-    // 0: no map.
-    face_count: u32,
-    // Texels across; 0 is the nearest texel.
-    filter_width: f32,
-    // Manual bias; below 0 it tunes itself.
-    slope_bias: f32,
-    constant_bias: f32,
-    map_flags: u32,
-    // Of the source: tangent of half the angle under which it is seen (directional), or radius, metres.
-    size: f32,
-    flags: u32,
-};
-
 const CASTS: u32 = 1u;
 
 const DIRECTIONAL: u32 = 0u;
@@ -53,9 +26,18 @@ const MAP_DARK_OUTSIDE: u32 = 2u;
 const MAP_POISSON: u32 = 4u;
 const MAP_PCSS: u32 = 8u;
 
-// What the lights and the air of a frame need.
+// What the lights and the air of a frame need; the rest is left out of a pipeline.
 override MAPS: bool = true;
-override FOG: bool = true;
+// Some light shines from a position.
+override LAMPS: bool = true;
+// Some light adds to what comes from everywhere.
+override AMBIENTS: bool = true;
+// Some surface lists the lights whose shadows fall on it.
+override LISTS: bool = true;
+// 0: none, 1: linear, 2: exponential; another number leaves it open.
+override FOG: u32 = 3u;
+// How many lights a pass adds up; more than the view holds leaves it open.
+override LIGHTS: u32 = 3u;
 
 @group(3) @binding(0) var<uniform> frame: Frame;
 @group(3) @binding(1) var<storage, read> lights: array<Light>;
@@ -67,7 +49,7 @@ struct Incidence {
 };
 
 fn incidence(light: Light, p_in_world: vec3<f32>) -> Incidence {
-    if light.kind == DIRECTIONAL {
+    if !LAMPS || light.kind == DIRECTIONAL {
         return Incidence(-light.direction, 1.0);
     }
     let offset = light.position - p_in_world;
@@ -90,13 +72,13 @@ fn incidence(light: Light, p_in_world: vec3<f32>) -> Incidence {
 
 // Share of fog at a distance from the eye (X3D Fog).
 fn fog_share(distance: f32) -> f32 {
-    if !FOG || frame.fog_range <= 0.0 {
+    if FOG == 0u || frame.fog_range <= 0.0 {
         return 0.0;
     }
     if distance >= frame.fog_range {
         return 1.0;
     }
-    if frame.fog_kind == 1u {
+    if FOG == 2u || (FOG != 1u && frame.fog_kind == 1u) {
         return 1.0 - exp(-distance / (frame.fog_range - distance));
     }
     return distance / frame.fog_range;

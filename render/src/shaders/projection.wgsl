@@ -18,7 +18,7 @@ struct ShadowTexture {
 
 // Does a surface say itself which lights' shadows fall on it?
 fn lists_lights(instance_flags: u32) -> bool {
-    return ((instance_flags >> 8u) & 0xffffu) != 0u;
+    return LISTS && ((instance_flags >> 8u) & 0xffffu) != 0u;
 }
 
 // Does the numbered light cast on the surface?

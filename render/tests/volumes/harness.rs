@@ -164,7 +164,7 @@ impl Gpu {
         light: VolumeLight,
         view: &View,
     ) -> (Vec<u32>, VolumeStats, VolumeDraws) {
-        let mut view_data = [0f32; 68];
+        let mut view_data = [0f32; 132];
         let clip_from_view = match self.depth {
             Depth::Reversed => view.frustum.clip_from_view(),
             Depth::Conventional => view.frustum.clip_from_view_conventional((-22f32).exp2()),
