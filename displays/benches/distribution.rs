@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use glam::{Quat, Vec3};
 use umbriel_displays::cluster::{ClusterError, Follower, FollowerOptions, Host, HostOptions, LEASE, Screen, Security};
+use umbriel_fields::replica::{Bulk, Packet, Publisher, Replica};
 use umbriel_fields::{FieldId, Graph, NodeType, TypeRegistry, builtin_types};
 use umbriel_scenegraph::{new_graph, node_types};
 
@@ -89,13 +90,54 @@ fn write(graph: &mut Graph, fields: &[[FieldId; FIELDS]], frame: usize) -> Resul
     Ok(())
 }
 
-fn application() -> Result<(), Failure> {
+/// A graph of transforms, and the fields that are written.
+fn world() -> Result<(Graph, Vec<[FieldId; FIELDS]>), Failure> {
     let mut graph = new_graph();
     let mut fields = Vec::new();
     for _ in 0..TRANSFORMS {
         let node = graph.create("Transform")?;
         fields.push([graph.field(node, "translation")?, graph.field(node, "rotation")?, graph.field(node, "scale")?]);
     }
+    Ok((graph, fields))
+}
+
+/// What a frame costs at each end, without a network: medians of one process that has the machine for itself.
+fn parts() -> Result<(), Failure> {
+    let (mut graph, fields) = world()?;
+    let mut publisher = Publisher::new();
+    publisher.frame(&graph);
+    let snapshot = publisher.snapshot(&graph).ok_or("the graph was written")?;
+    let types: Vec<NodeType> = node_types().into_iter().chain(builtin_types()).collect();
+    let bulk = Bulk::new();
+    let mut replica = Replica::new(&Packet::read(&snapshot)?, TypeRegistry::from(types), &bulk)?;
+    let mut took_us = [const { Vec::new() }; 4];
+    for frame in 0..FRAMES {
+        let begun = Instant::now();
+        write(&mut graph, &fields, frame)?;
+        let written = Instant::now();
+        let bytes = publisher.frame(&graph);
+        let made = Instant::now();
+        let packet = Packet::read(bytes)?;
+        let read = Instant::now();
+        replica.apply(&packet, &bulk)?;
+        let applied = Instant::now();
+        let steps = [written - begun, made - written, read - made, applied - read];
+        took_us.iter_mut().zip(steps).for_each(|(all, step)| all.push(step.as_secs_f64() * 1e6));
+    }
+    println!("one frame of {} values, and the hash agrees: {}", TRANSFORMS * FIELDS, replica.agrees());
+    let labels =
+        ["the application writes its fields", "gathered, hashed, packed", "checksum of the packet", "written to fields, hashed"];
+    for (label, all) in labels.into_iter().zip(&mut took_us) {
+        all.sort_unstable_by(f64::total_cmp);
+        let median = all[all.len() / 2];
+        println!("  {label}: {median:.0} us, {:.1} ns a value", median * 1e3 / (TRANSFORMS * FIELDS) as f64);
+    }
+    Ok(())
+}
+
+fn application() -> Result<(), Failure> {
+    parts()?;
+    let (mut graph, fields) = world()?;
     let endpoint = format!("tcp/{}", free_address()?);
     let mut host =
         Host::listen(&HostOptions { listen: endpoint.clone(), security: Security::Loopback, timeout: TIMEOUT, lease: LEASE })?;

@@ -12,7 +12,7 @@ impl Graph {
     /// Where a field's value is.
     #[inline]
     pub(crate) fn place(&self, field: FieldId) -> Result<(&Field, u32), Error> {
-        let node = self.nodes.get(field.node).ok_or(Error::DeadNode)?;
+        let Some(node) = self.nodes.get(field.node) else { return Err(Error::DeadNode) };
         match node.field(field.index) {
             Some(declared) => Ok((declared, node.slots[field.index as usize])),
             None => Err(self.dead_field(field)),
@@ -63,7 +63,7 @@ impl Graph {
 
     /// Writes a field; see [`Graph::set`].
     pub fn set_value(&mut self, field: FieldId, value: Value) -> Result<(), Error> {
-        if self.write(field, value)? {
+        if self.write(field, &value)? {
             self.schedule.mark(slot_of(field.node));
             self.note_write(field, false);
             self.explain_write(field);
@@ -73,7 +73,7 @@ impl Graph {
 
     /// Writes a field without consequences: no evaluation, no callback, no route. Readers of revisions see it.
     pub fn set_silent(&mut self, field: FieldId, value: impl Into<Value>) -> Result<(), Error> {
-        if self.write(field, value.into())? {
+        if self.write(field, &value.into())? {
             self.schedule.flags[slot_of(field.node) as usize] |= SILENCED;
             self.silenced.insert(field, self.changes.last());
             self.note_write(field, true);
@@ -101,15 +101,14 @@ impl Graph {
     }
 
     /// Writes without asking for a turn; says whether anything was written.
-    fn write(&mut self, field: FieldId, value: Value) -> Result<bool, Error> {
+    fn write(&mut self, field: FieldId, value: &Value) -> Result<bool, Error> {
         let (declared, slot) = self.place(field)?;
         let compare = declared.on_set == SetRule::Compare;
-        let value = match self.fitting(field, declared, &value)? {
-            Some(converted) => converted,
-            None => value,
-        };
+        let fits =
+            declared.field_type == value.field_type() && declared.field_type.kind != Kind::Enum && declared.range.is_none();
+        let converted = if fits { None } else { self.fitting(field, declared, value)? };
         let revision = self.changes.last() + 1;
-        let written = self.columns.write(slot, value, compare, revision);
+        let written = self.columns.write(slot, converted.as_ref().unwrap_or(value), compare, revision);
         if written {
             self.changes.next();
             self.changes.wrote(slot_of(field.node), revision);

@@ -28,6 +28,8 @@ const SMALLEST_LIMIT: usize = 65_536;
 pub(crate) struct ChangeLog {
     /// Of the last write.
     revision: Revision,
+    /// Of the last time that a node came, went, was named or shown to replicas, or that a field was added or removed.
+    shape: Revision,
     /// By node slot: the revision of the node's last write.
     nodes: Vec<Revision>,
     /// The last revision that a reader asked for. A node is logged again only if it was not written since.
@@ -67,6 +69,17 @@ impl ChangeLog {
     pub(crate) fn boundary(&self) -> Revision {
         self.boundary.store(self.revision, Ordering::Relaxed);
         self.revision
+    }
+
+    /// When nodes, their names and their fields were last what they had not been before.
+    pub(crate) fn shape(&self) -> Revision {
+        self.shape
+    }
+
+    /// Notes a write after which a node is made of something else than before, whatever its fields hold.
+    pub(crate) fn reshaped(&mut self, slot: u32, revision: Revision) {
+        self.shape = revision;
+        self.wrote(slot, revision);
     }
 
     pub(crate) fn node(&self, slot: u32) -> Revision {
@@ -111,7 +124,10 @@ impl ChangeLog {
     /// Notes nodes that were not written since the last revision that a reader asked for.
     pub(crate) fn log(&mut self, slots: &[u32]) {
         let boundary = *self.boundary.get_mut();
-        slots.iter().for_each(|slot| self.append(*slot, boundary));
+        if let Some((first, others)) = slots.split_first() {
+            self.append(*first, boundary);
+            self.log.extend(others);
+        }
     }
 
     #[inline]
@@ -124,6 +140,7 @@ impl ChangeLog {
     }
 
     pub(crate) fn deleted(&mut self, id: NodeId, revision: Revision) {
+        self.shape = revision;
         self.deleted.push_back((revision, id));
         if self.deleted.len() > self.limit() {
             self.floor = self.floor.max(self.deleted[self.deleted.len() / 2].0);
@@ -138,7 +155,7 @@ impl ChangeLog {
 
     /// Takes the place of a fresh log: readers must look at everything.
     pub(crate) fn restore(&mut self, revision: Revision, nodes: Vec<Revision>) {
-        *self = Self { revision, nodes, boundary: AtomicU64::new(revision), floor: revision, ..Self::default() };
+        *self = Self { revision, shape: revision, nodes, boundary: AtomicU64::new(revision), floor: revision, ..Self::default() };
     }
 
     fn limit(&self) -> usize {
@@ -169,6 +186,29 @@ impl ChangeLog {
         self.deleted.drain(..gone);
     }
 
+    /// The segment that a revision lies in, and where in the log it starts.
+    fn segment(&self, revision: Revision) -> (usize, usize) {
+        let segment = self.segments.partition_point(|(boundary, _)| *boundary <= revision).saturating_sub(1);
+        (segment, self.segments.get(segment).map_or(0, |(_, start)| start - self.dropped))
+    }
+
+    /// Slots of nodes written after a revision, in ascending order, whether or not anything stands there still.
+    pub(crate) fn slots_since(&self, revision: Revision) -> Vec<u32> {
+        if revision >= self.revision {
+            return Vec::new();
+        }
+        let is_new = |slot: &u32| self.nodes[*slot as usize] > revision;
+        let (_, start) = self.segment(revision);
+        // Looking at all nodes in a row takes no longer than sorting an eighth of them.
+        if revision < self.floor || (self.log.len() - start) * 8 > self.nodes.len() {
+            return (0..self.nodes.len() as u32).filter(is_new).collect();
+        }
+        let mut slots: Vec<u32> = self.log.range(start..).copied().filter(is_new).collect();
+        slots.sort_unstable();
+        slots.dedup();
+        slots
+    }
+
     /// Nodes written or deleted after a revision. `ids` by slot; dead slots hold null.
     pub(crate) fn since(&self, revision: Revision, ids: &[NodeId]) -> Changes {
         if revision < self.floor {
@@ -177,8 +217,7 @@ impl ChangeLog {
         if revision >= self.revision {
             return Changes::Nodes(Vec::new());
         }
-        let segment = self.segments.partition_point(|(boundary, _)| *boundary <= revision).saturating_sub(1);
-        let start = self.segments.get(segment).map_or(0, |(_, start)| start - self.dropped);
+        let (segment, start) = self.segment(revision);
         let mut slots: Vec<u32> = self.log.range(start..).copied().filter(|slot| self.nodes[*slot as usize] > revision).collect();
         if segment + 1 < self.segments.len() {
             slots.sort_unstable();

@@ -237,11 +237,11 @@ macro_rules! columns {
                 )* }
             }
 
-            /// Writes a value into a slot of the value's own type.
-            pub(crate) fn write(&mut self, slot: u32, value: Value, compare: bool, revision: Revision) -> bool {
+            /// Writes a value into a slot of the value's own type. A value has the size of a matrix: it is not moved for that.
+            pub(crate) fn write(&mut self, slot: u32, value: &Value, compare: bool, revision: Revision) -> bool {
                 match value { $(
-                    Value::$one(one) => self.$one_column.write(slot, one, compare, revision),
-                    Value::$many(many) => self.$many_column.write(slot, many, compare, revision),
+                    Value::$one(one) => self.$one_column.write(slot, one.clone(), compare, revision),
+                    Value::$many(many) => self.$many_column.write(slot, many.clone(), compare, revision),
                 )* }
             }
 

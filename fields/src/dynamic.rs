@@ -33,7 +33,7 @@ impl Graph {
         node.dynamic[place] = Some(field);
         node.slots[index as usize] = slot;
         self.schedule.layout += 1;
-        self.changes.wrote(slot_of(id), revision);
+        self.changes.reshaped(slot_of(id), revision);
         self.schedule.mark(slot_of(id));
         let added = FieldId { node: id, index };
         if let Some(field) = noted {
@@ -60,7 +60,7 @@ impl Graph {
         let slot = std::mem::replace(&mut node.slots[field.index as usize], FREE);
         self.columns.remove(field_type, slot);
         let revision = self.changes.next();
-        self.changes.wrote(slot_of(field.node), revision);
+        self.changes.reshaped(slot_of(field.node), revision);
         self.note(|| Event::FieldRemoved(field));
         Ok(())
     }

@@ -198,7 +198,7 @@ impl Graph {
         }
         let flags = node.base_flags();
         self.schedule.created(slot, flags, created);
-        self.changes.wrote(slot, created);
+        self.changes.reshaped(slot, created);
         self.schedule.mark(slot);
         if mode == Mode::Always {
             self.frame.always.insert(slot);

@@ -24,7 +24,7 @@ impl Graph {
             self.names.insert(name, id);
         }
         let revision = self.changes.next();
-        self.changes.wrote(slot_of(id), revision);
+        self.changes.reshaped(slot_of(id), revision);
         if self.journal.is_some() {
             let name = self.nodes[id].name.clone();
             self.note(|| Event::Named(id, name));

@@ -143,7 +143,7 @@ impl Graph {
             None => written <= last,
         };
         let Some(value) = (if late { None } else { carried_as(value, target) }) else { return false };
-        let copied = self.columns.write(slot, value, compare, revision);
+        let copied = self.columns.write(slot, &value, compare, revision);
         if copied {
             self.changes.wrote(slot_of(route.to.node), revision);
             self.schedule.mark(slot_of(route.to.node));
@@ -168,7 +168,7 @@ impl Graph {
         let Ok((target, slot)) = self.place(to) else { return };
         let Some(value) = carried_as(&value, target) else { return };
         let revision = self.changes.last() + 1;
-        if self.columns.write(slot, value, true, revision) {
+        if self.columns.write(slot, &value, true, revision) {
             self.changes.next();
             self.changes.wrote(slot_of(to.node), revision);
             self.schedule.mark(slot_of(to.node));

@@ -13,7 +13,7 @@ use super::event::Event;
 use super::line::{Answer, Line};
 use super::lock::{DisplayAction, DisplayEvent, DisplayLock};
 use super::message::{
-    DISPLAY, FRAME, INPUT, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, Told, bytes_of, message_of, unstamped,
+    DISPLAY, FRAME, INPUT, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, Told, bytes_of, message_of, stamped_packet,
 };
 use super::ordered::Outbox;
 use super::transport::{ClusterError, End, Security, network};
@@ -84,8 +84,8 @@ pub struct Follower {
     is_new: bool,
     bulk: Bulk,
     parked: VecDeque<Parked>,
-    packets: BTreeMap<u64, Vec<u8>>,
-    snapshot: Vec<u8>,
+    packets: BTreeMap<u64, Packet<'static>>,
+    snapshot: Option<Packet<'static>>,
     started: Instant,
     last_shown: Option<Instant>,
     refused_since: Option<Instant>,
@@ -142,7 +142,7 @@ impl Follower {
             bulk: Bulk::new(),
             parked: VecDeque::new(),
             packets: BTreeMap::new(),
-            snapshot: Vec::new(),
+            snapshot: None,
             started: Instant::now(),
             last_shown: None,
             refused_since: None,
@@ -226,8 +226,8 @@ impl Follower {
 
     fn handle<S: Screen>(&mut self, arrived: Arrived, screen: &mut S) -> Result<(), S::Error> {
         match arrived {
-            Arrived::Frame(bytes) => match unstamped(&bytes).map(|(epoch, packet)| (epoch, Packet::read(packet))) {
-                Some((epoch, Ok(packet))) => {
+            Arrived::Frame(bytes) => match stamped_packet(bytes) {
+                Ok((epoch, packet)) => {
                     let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
                     if epoch > self.lock.epoch() {
                         self.packets.clear();
@@ -236,13 +236,12 @@ impl Follower {
                     }
                     self.line.ask_for_bulk(missing, Arrived::Bulk);
                     if epoch == self.lock.epoch() {
-                        self.packets.insert(frame, bytes);
+                        self.packets.insert(frame, packet);
                         self.parked.push_back(Parked::Frame(epoch, frame));
                     }
                 }
                 // What is damaged is a gap: a snapshot closes it.
-                Some((_, Err(error))) => tracing::error!("a frame cannot be used: {error}"),
-                None => tracing::error!("a frame cannot be used: it is empty"),
+                Err(error) => tracing::error!("a frame cannot be used: {error}"),
             },
             Arrived::Release(bytes) => match message_of::<Release>(&bytes) {
                 Ok(release) => {
@@ -260,11 +259,10 @@ impl Follower {
             },
             Arrived::Snapshot(Ok(bytes)) => {
                 self.refused_since = None;
-                let (epoch, packet) = unstamped(&bytes).ok_or_else(|| ClusterError::Message("a snapshot is empty".into()))?;
-                let packet = Packet::read(packet).map_err(ClusterError::from)?;
+                let (epoch, packet) = stamped_packet(bytes).map_err(ClusterError::from)?;
                 let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
                 self.line.ask_for_bulk(missing, Arrived::Bulk);
-                self.snapshot = bytes;
+                self.snapshot = Some(packet);
                 self.parked.retain(|parked| matches!(parked, Parked::Frame(..)));
                 self.parked.push_front(Parked::Snapshot(epoch, frame));
             }
@@ -301,11 +299,10 @@ impl Follower {
     /// Tells the lock what is complete, in order.
     fn unpark<S: Screen>(&mut self, screen: &mut S) -> Result<(), S::Error> {
         while let Some(parked) = self.parked.front() {
-            let bytes = match parked {
+            let packet = match parked {
                 Parked::Frame(_, frame) => self.packets.get(frame),
-                Parked::Snapshot(..) => Some(&self.snapshot),
+                Parked::Snapshot(..) => self.snapshot.as_ref(),
             };
-            let packet = bytes.and_then(|bytes| unstamped(bytes)).and_then(|(_, packet)| Packet::read(packet).ok());
             if packet.is_some_and(|packet| !packet.missing(&self.bulk).is_empty()) {
                 return Ok(());
             }
@@ -373,9 +370,8 @@ impl Follower {
 
     /// Makes the replica anew. Where the old one was doubted, what differs is told.
     fn restore(&mut self) -> Result<(), ClusterError> {
-        let bytes = std::mem::take(&mut self.snapshot);
-        let (_, packet) = unstamped(&bytes).ok_or_else(|| ClusterError::Message("a snapshot is empty".into()))?;
-        let mut fresh = Replica::new(&Packet::read(packet)?, self.types.clone(), &self.bulk)?;
+        let packet = self.snapshot.take().ok_or_else(|| ClusterError::Message("there is no snapshot".into()))?;
+        let mut fresh = Replica::new(&packet, self.types.clone(), &self.bulk)?;
         for name in fresh.unknown_types() {
             tracing::info!(
                 "the application's node type `{name}` is not known here: its nodes are held, and nothing is drawn for them"
@@ -398,14 +394,10 @@ impl Follower {
     }
 
     fn apply(&mut self, frame: u64) -> Result<DisplayEvent, ClusterError> {
-        let bytes = self.packets.remove(&frame).unwrap_or_default();
-        let Some(replica) = &mut self.replica else { return Ok(DisplayEvent::Diverged(frame)) };
-        let packet = unstamped(&bytes).map(|(_, packet)| Packet::read(packet));
-        let applied = match packet {
-            Some(Ok(packet)) => replica.apply(&packet, &self.bulk),
-            _ => return Ok(DisplayEvent::Diverged(frame)),
+        let (Some(packet), Some(replica)) = (self.packets.remove(&frame), &mut self.replica) else {
+            return Ok(DisplayEvent::Diverged(frame));
         };
-        match applied {
+        match replica.apply(&packet, &self.bulk) {
             Ok(()) if replica.agrees() => return Ok(DisplayEvent::Applied(frame)),
             Ok(()) => {
                 tracing::warn!("frame {frame}: the world here is not that of the application; fetching it");

@@ -126,7 +126,9 @@ impl Host {
                 }
             }
         });
-        let frames = session.declare_publisher(FRAME).congestion_control(CongestionControl::Drop).wait().map_err(network)?;
+        // Express: the last piece of a frame does not wait for company.
+        let frames = session.declare_publisher(FRAME).congestion_control(CongestionControl::Drop).express(true);
+        let frames = frames.wait().map_err(network)?;
         let releases = session
             .declare_publisher(RELEASE)
             .congestion_control(CongestionControl::Drop)
@@ -231,7 +233,7 @@ impl Host {
         self.hashes.remove(&frame.wrapping_sub(256));
         self.report.frames = frame;
         self.report.bytes += packet.len() as u64;
-        if let Err(error) = self.frames.put(stamped(self.epoch, &packet)).wait() {
+        if let Err(error) = self.frames.put(stamped(self.epoch, packet)).wait() {
             tracing::warn!("frame {frame} could not be sent: {error}");
         }
         let published = Instant::now();
@@ -367,7 +369,7 @@ impl Host {
         {
             return Some(bytes.clone());
         }
-        let bytes: Arc<[u8]> = stamped(self.epoch, &self.publisher.snapshot(graph)?).into();
+        let bytes: Arc<[u8]> = stamped(self.epoch, self.publisher.snapshot(graph)?).into();
         self.snapshot = Some((frame, bytes.clone()));
         Some(bytes)
     }

@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use umbriel_fields::replica::Deed;
+use umbriel_fields::replica::{Deed, Packet, ReplicaError};
 
 use super::event::Event;
 use super::transport::ClusterError;
 
 /// Spoken by both ends; another one is refused.
-pub(super) const PROTOCOL: u16 = 3;
+pub(super) const PROTOCOL: u16 = 4;
 
 pub(super) const FRAME: &str = "umbriel/frame";
 pub(super) const RELEASE: &str = "umbriel/release";
@@ -130,12 +130,16 @@ pub(super) fn message_of<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, C
     postcard::from_bytes(bytes).map_err(|error| ClusterError::Message(error.to_string()))
 }
 
-/// A packet with the run of the application before it.
-pub(super) fn stamped(epoch: u64, packet: &[u8]) -> Vec<u8> {
-    [&epoch.to_le_bytes(), packet].concat()
+/// A packet with the run of the application behind it.
+pub(super) fn stamped(epoch: u64, mut packet: Vec<u8>) -> Vec<u8> {
+    packet.extend_from_slice(&epoch.to_le_bytes());
+    packet
 }
 
-pub(super) fn unstamped(bytes: &[u8]) -> Option<(u64, &[u8])> {
-    let (epoch, packet) = bytes.split_first_chunk::<8>()?;
-    Some((u64::from_le_bytes(*epoch), packet))
+/// The run of the application, and its packet.
+pub(super) fn stamped_packet(mut bytes: Vec<u8>) -> Result<(u64, Packet<'static>), ReplicaError> {
+    let (_, stamp) = bytes.split_last_chunk::<8>().ok_or(ReplicaError::NotAPacket)?;
+    let epoch = u64::from_le_bytes(*stamp);
+    bytes.truncate(bytes.len() - stamp.len());
+    Ok((epoch, Packet::read(bytes)?))
 }

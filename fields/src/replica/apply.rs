@@ -2,17 +2,18 @@
 
 use std::collections::{HashMap, HashSet};
 
-use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
-
 use super::bulk::{Bulk, ImageHashes};
-use super::flat::{Flat, FlatBytes, floats_of};
+use super::flat::{scatter_flat, share_of_flat};
+use super::herd::Herds;
 use super::learn::{Finder, LocalType, NONE, Namer, Nodes, local_type};
-use super::packet::{Head, Packet, Place, places};
-use super::shares::{Shares, field_share, route_share};
+use super::packet::{FieldOf, GroupRead, Head, Packet, Place};
+use super::runs::Run;
+use super::shares::{field_share, route_share};
 use super::{ReplicaError, damaged};
 use crate::codec::{take_value, to_bytes};
+use crate::column::{Columns, FREE};
 use crate::graph::slot_of;
-use crate::{Changes, Color, ColorA, FieldId, FieldType, Graph, Kind, NodeId, Revision, Strength, TypeRegistry, Value};
+use crate::{Changes, Field, FieldId, FieldType, Graph, Kind, NodeId, Revision, Strength, TypeRegistry, Value};
 
 /// A node of the application, here.
 pub(super) struct Held {
@@ -34,7 +35,7 @@ pub struct Replica {
     pub(super) held: Vec<Option<Held>>,
     nodes: Nodes,
     pub(super) types: HashMap<u32, LocalType>,
-    pub(super) shares: Shares,
+    pub(super) herds: Herds,
     hashes: ImageHashes,
     /// Writes up to this one are in the hash.
     mark: Revision,
@@ -59,7 +60,7 @@ impl Replica {
             held: Vec::new(),
             nodes: Nodes::default(),
             types: HashMap::new(),
-            shares: Shares::default(),
+            herds: Herds::default(),
             hashes: ImageHashes::default(),
             mark: 0,
             unknown: Vec::new(),
@@ -102,7 +103,7 @@ impl Replica {
 
     /// The hash of all values here.
     pub fn hash(&self) -> u64 {
-        self.shares.sum()
+        self.herds.sum()
     }
 
     /// The same, with what was written to the graph since the last frame.
@@ -161,7 +162,7 @@ impl Replica {
     fn declare(&mut self, head: &Head, bulk: &Bulk) -> Result<(), ReplicaError> {
         for (number, record) in &head.types {
             let mut find = Finder { nodes: &mut self.nodes, held: &self.held, bulk, missed: 0 };
-            let (local, unknown) = local_type(&self.graph, record, &mut find)?;
+            let (local, unknown) = local_type(&self.graph, &mut self.herds, record, &mut find)?;
             self.types.insert(*number, local);
             self.unknown.extend(unknown);
         }
@@ -175,22 +176,25 @@ impl Replica {
             let route = route.ok_or_else(|| damaged("it removes a route that is not there"))?;
             let is_weak = self.graph.route(route).is_some_and(|route| route.strength == Strength::Weak);
             self.graph.disconnect(route);
-            self.shares.subtract(route_share(*from, *to, is_weak));
+            self.herds.subtract(route_share(*from, *to, is_weak));
         }
         for place in &head.fields_removed {
             let field = self.place(*place)?;
+            if self.herds.is_declared(*place) {
+                return Err(damaged("it removes a field that belongs to a type"));
+            }
             self.graph.remove_field(field).map_err(|error| damaged(error.to_string()))?;
             if let Some(Some(held)) = self.held.get_mut(place.0 as u32 as usize) {
                 held.dynamic.retain(|(index, _)| *index != place.1);
             }
-            self.shares.set_field(place.0, place.1, 0);
+            self.herds.set_field(place.0, place.1, 0);
         }
         for number in &head.removed {
             let id = self.node(*number).ok_or_else(|| damaged("it removes a node that is not there"))?;
             self.graph.delete(id).map_err(|error| damaged(error.to_string()))?;
             self.held[*number as u32 as usize] = None;
             self.nodes.dead.insert(*number, id);
-            self.shares.remove(*number);
+            self.herds.remove(*number);
         }
         Ok(())
     }
@@ -218,9 +222,13 @@ impl Replica {
             for (index, value) in &local.defaults {
                 put(&mut self.graph, FieldId { node: id, index: *index }, value.clone())?;
             }
+            let slots = &self.graph.nodes[id].slots;
+            let added = |index: u16| dynamic.iter().find(|(there, _)| *there == index).map(|(_, here)| *here);
+            let here =
+                |index: u16| local.to_local.get(index as usize).copied().filter(|here| *here != NONE).or_else(|| added(index));
+            self.herds.insert(*number, slot_of(id), local.herd, |index| here(index).map_or(FREE, |here| slots[here as usize]));
             self.held[slot] = Some(Held { number: *number, id, node_type: *node_type, dynamic });
             self.nodes.numbers.insert(id, *number);
-            self.shares.insert(*number);
             if let Some(nobody) = self.nodes.dead.remove(number) {
                 self.nodes.numbers.remove(&nobody);
                 replace_references(&mut self.graph, nobody, id);
@@ -250,7 +258,7 @@ impl Replica {
             let strength = if *weak { Strength::Weak } else { Strength::Strong };
             let (source, target) = (self.place(*from)?, self.place(*to)?);
             self.graph.link(source, target, strength).map_err(|error| damaged(error.to_string()))?;
-            self.shares.add(route_share(*from, *to, *weak));
+            self.herds.add(route_share(*from, *to, *weak));
         }
         Ok(())
     }
@@ -262,72 +270,30 @@ impl Replica {
             let field_type = self.graph.declaration(field).map_err(|error| damaged(error.to_string()))?.field_type;
             self.value(*place, field, field_type, &mut &bytes[..], bulk)?;
         }
-        for (field_type, at, bytes) in &packet.groups {
-            match self.flat_group(*field_type, at, bytes) {
+        for group in packet.groups() {
+            let group = group?;
+            let flat = match group.field {
+                FieldOf::Type(index) => scatter_flat(&mut self.graph, &mut self.herds, index, group),
+                FieldOf::Node(_) => None,
+            };
+            match flat {
                 Some(done) => done?,
-                None => self.group(*field_type, at, bytes, bulk)?,
+                None => self.group(group, bulk)?,
             }
         }
         Ok(())
     }
 
-    fn group(&mut self, field_type: FieldType, at: &[u8], bytes: &[u8], bulk: &Bulk) -> Result<(), ReplicaError> {
-        let mut rest = bytes;
-        for (slot, index) in places(at) {
-            let held = self.held.get(slot as usize).and_then(Option::as_ref);
+    fn group(&mut self, group: GroupRead<'_>, bulk: &Bulk) -> Result<(), ReplicaError> {
+        let (FieldOf::Type(index) | FieldOf::Node(index)) = group.field;
+        let mut rest = group.values;
+        for slot in group.runs.iter().flat_map(Run::slots) {
+            let held = self.held.get(slot).and_then(Option::as_ref);
             let held = held.ok_or_else(|| damaged("it writes to a node that is not there"))?;
             let (place, field) = ((held.number, index), self.field_of(held, index)?);
-            self.value(place, field, field_type, &mut rest, bulk)?;
+            self.value(place, field, group.field_type, &mut rest, bulk)?;
         }
         if rest.is_empty() { Ok(()) } else { Err(damaged("values are left over")) }
-    }
-
-    /// A group of values that are floats; None of others.
-    fn flat_group(&mut self, field_type: FieldType, at: &[u8], bytes: &[u8]) -> Option<Result<(), ReplicaError>> {
-        if field_type.multiple {
-            return None;
-        }
-        Some(match field_type.kind {
-            Kind::F32 => self.floats::<f32, 1>(at, bytes),
-            Kind::Vec2 => self.floats::<Vec2, 2>(at, bytes),
-            Kind::Vec3 => self.floats::<Vec3, 3>(at, bytes),
-            Kind::Vec4 => self.floats::<Vec4, 4>(at, bytes),
-            Kind::Quat => self.floats::<Quat, 4>(at, bytes),
-            Kind::Mat4 => self.floats::<Mat4, 16>(at, bytes),
-            Kind::Color => self.floats::<Color, 3>(at, bytes),
-            Kind::ColorA => self.floats::<ColorA, 4>(at, bytes),
-            _ => return None,
-        })
-    }
-
-    fn floats<T: Flat<COUNT>, const COUNT: usize>(&mut self, at: &[u8], bytes: &[u8]) -> Result<(), ReplicaError> {
-        if bytes.len() / (4 * COUNT) != at.len() / 6 || !bytes.len().is_multiple_of(4 * COUNT) {
-            return Err(damaged("it has more places than values, or fewer"));
-        }
-        let Replica { graph, held, types, shares, .. } = self;
-        // Nodes of one type stand together as a rule.
-        let mut last: Option<(u32, &LocalType)> = None;
-        for ((slot, index), bytes) in places(at).zip(bytes.chunks_exact(4 * COUNT)) {
-            let held = held.get(slot as usize).and_then(Option::as_ref);
-            let held = held.ok_or_else(|| damaged("it writes to a node that is not there"))?;
-            let local = match last {
-                Some((number, local)) if number == held.node_type => Some(local),
-                _ => types.get(&held.node_type).inspect(|local| last = Some((held.node_type, local))),
-            };
-            let field = field_here(local, held, index)?;
-            let (declared, place) = graph.place(field).map_err(|error| damaged(error.to_string()))?;
-            if declared.field_type != T::TYPE {
-                return Err(damaged(format!("{} does not hold a {}", graph.describe_field(field), T::TYPE)));
-            }
-            let revision = graph.changes.next();
-            let column = T::column_mut(&mut graph.columns);
-            column.write(place, T::of_floats(floats_of(bytes)), false, revision);
-            // What stands there counts, not what was to be written.
-            let stands = FlatBytes::of(column.values[place as usize].floats());
-            graph.changes.wrote(slot_of(field.node), revision);
-            shares.set_field(held.number, index, field_share(held.number, index, stands.as_slice()));
-        }
-        Ok(())
     }
 
     fn value(
@@ -347,8 +313,8 @@ impl Replica {
         put(&mut self.graph, field, value)?;
         let (declared, slot) = self.graph.place(field).map_err(|error| damaged(error.to_string()))?;
         let mut namer = Namer { numbers: &self.nodes.numbers, hashes: &mut self.hashes };
-        let stands = to_bytes(&self.graph.columns.value(field_type, slot), declared, &mut namer, Vec::new());
-        self.shares.set_field(place.0, place.1, field_share(place.0, place.1, &stands));
+        let share = share_there(&self.graph.columns, declared, slot, place, &mut namer);
+        self.herds.set_field(place.0, place.1, share);
         Ok(())
     }
 
@@ -367,13 +333,12 @@ impl Replica {
             Changes::Nodes(nodes) => nodes,
             Changes::All => self.graph.nodes().collect(),
         };
-        let mut bytes = Vec::new();
         for id in nodes {
             let Some(node) = self.graph.nodes.get(id) else { continue };
             let Some(number) = self.nodes.numbers.get(&id).copied() else { continue };
             let Some(held) = self.held(number) else { continue };
             let Some(local) = self.types.get(&held.node_type) else { continue };
-            self.shares.set_own(number, &node.node_type.name, node.name.as_deref().unwrap_or_default());
+            self.herds.set_own(number, &node.node_type.name, node.name.as_deref().unwrap_or_default());
             let declared = local.to_local.iter().enumerate().map(|(index, local)| (index as u16, *local));
             let fields = declared.filter(|(_, local)| *local != NONE);
             let held = self.held[number as u32 as usize].as_ref();
@@ -381,13 +346,12 @@ impl Replica {
                 let Some(field) = node.field(local) else { continue };
                 let slot = node.slots[local as usize];
                 let revision = self.graph.columns.revisions(field.field_type)[slot as usize];
-                if revision <= self.mark && self.shares.field(number, index) != 0 {
+                if revision <= self.mark && self.herds.field(number, index) != 0 {
                     continue;
                 }
                 let mut namer = Namer { numbers: &self.nodes.numbers, hashes: &mut self.hashes };
-                bytes.clear();
-                bytes = to_bytes(&self.graph.columns.value(field.field_type, slot), field, &mut namer, bytes);
-                self.shares.set_field(number, index, field_share(number, index, &bytes));
+                let share = share_there(&self.graph.columns, field, slot, (number, index), &mut namer);
+                self.herds.set_field(number, index, share);
             }
         }
         self.mark = self.graph.revision();
@@ -407,6 +371,15 @@ impl Replica {
     }
 }
 
+/// What a field adds to the hash by what stands in it.
+fn share_there(columns: &Columns, field: &Field, slot: u32, place: Place, namer: &mut Namer<'_>) -> u64 {
+    let by_bytes = || {
+        let bytes = to_bytes(&columns.value(field.field_type, slot), field, namer, Vec::new());
+        field_share(place.0, place.1, &bytes)
+    };
+    share_of_flat(columns, field.field_type, slot, place).unwrap_or_else(by_bytes)
+}
+
 /// The field of a node that has an index in the application.
 fn field_here(local: Option<&LocalType>, held: &Held, index: u16) -> Result<FieldId, ReplicaError> {
     let declared = local.and_then(|local| local.to_local.get(index as usize)).copied().filter(|local| *local != NONE);
@@ -422,7 +395,7 @@ pub(super) fn put(graph: &mut Graph, field: FieldId, value: Value) -> Result<(),
         return Err(damaged(format!("{} does not hold a {}", graph.describe_field(field), value.field_type())));
     }
     let revision = graph.changes.next();
-    graph.columns.write(slot, value, false, revision);
+    graph.columns.write(slot, &value, false, revision);
     graph.changes.wrote(slot_of(field.node), revision);
     Ok(())
 }

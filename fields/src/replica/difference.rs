@@ -3,7 +3,6 @@
 use std::fmt;
 
 use super::Replica;
-use super::shares::NodeShares;
 
 /// The first difference, in the order of the application's nodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,30 +32,33 @@ impl fmt::Display for Difference {
 impl Replica {
     /// Where this replica differs from one that was made of a snapshot of the same frame.
     pub fn difference(&self, truth: &Replica) -> Option<Difference> {
-        let slots = self.shares.nodes.len().max(truth.shares.nodes.len());
-        let of = |replica: &Replica, slot: usize| replica.shares.nodes.get(slot).cloned().flatten();
+        let slots = self.herds.seats.len().max(truth.herds.seats.len());
+        let of =
+            |replica: &Replica, slot: usize| replica.herds.seats.get(slot).map(|seat| seat.number).filter(|number| *number > 0);
         (0..slots).find_map(|slot| self.difference_at(truth, of(self, slot), of(truth, slot)))
     }
 
-    fn difference_at(&self, truth: &Replica, ours: Option<NodeShares>, theirs: Option<NodeShares>) -> Option<Difference> {
-        let (ours, theirs) = match (ours, theirs) {
-            (Some(ours), Some(theirs)) if ours.number == theirs.number => (ours, theirs),
+    fn difference_at(&self, truth: &Replica, ours: Option<u64>, theirs: Option<u64>) -> Option<Difference> {
+        let number = match (ours, theirs) {
+            (Some(ours), Some(theirs)) if ours == theirs => ours,
             (None, None) => return None,
-            (_, Some(theirs)) => return Some(truth.about(theirs.number, None, "nothing".into(), "the node".into())),
-            (Some(ours), None) => return Some(self.about(ours.number, None, "the node".into(), "nothing".into())),
+            (_, Some(theirs)) => return Some(truth.about(theirs, None, "nothing".into(), "the node".into())),
+            (Some(ours), None) => return Some(self.about(ours, None, "the node".into(), "nothing".into())),
         };
-        if ours.own != theirs.own {
-            let name = |replica: &Replica| replica.node(ours.number).map(|node| replica.graph.describe(node)).unwrap_or_default();
-            return Some(truth.about(ours.number, None, name(self), name(truth)));
+        if self.herds.own(number) != truth.herds.own(number) {
+            let name = |replica: &Replica| replica.node(number).map(|node| replica.graph.describe(node)).unwrap_or_default();
+            return Some(truth.about(number, None, name(self), name(truth)));
         }
-        let count = ours.fields.len().max(theirs.fields.len());
-        let share = |shares: &NodeShares, index: usize| shares.fields.get(index).copied().unwrap_or(0);
-        let index = (0..count).find(|index| share(&ours, *index) != share(&theirs, *index))? as u16;
-        let value = |replica: &Replica| match replica.field_at(ours.number, index) {
+        let mut indices = self.herds.fields(number);
+        indices.extend(truth.herds.fields(number));
+        indices.sort_unstable();
+        let is_other = |index: &u16| self.herds.field(number, *index) != truth.herds.field(number, *index);
+        let index = indices.into_iter().find(is_other)?;
+        let value = |replica: &Replica| match replica.field_at(number, index) {
             Some(field) => short(format!("{:?}", replica.graph.value(field))),
             None => "no such field".into(),
         };
-        Some(truth.about(ours.number, Some(index), value(self), value(truth)))
+        Some(truth.about(number, Some(index), value(self), value(truth)))
     }
 
     fn field_at(&self, number: u64, index: u16) -> Option<crate::FieldId> {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use slotmap::KeyData;
 
 use super::bulk::Bulk;
+use super::herd::Herds;
 use super::packet::TypeRecord;
 use super::{ReplicaError, damaged};
 use crate::codec::{Find, Name, Ref};
@@ -17,6 +18,8 @@ pub(super) const NONE: u16 = u16::MAX;
 /// A type of the application, as it is here.
 pub(super) struct LocalType {
     pub(super) node_type: Arc<NodeType>,
+    /// Its number among the herds.
+    pub(super) herd: u32,
     /// By the application's index.
     pub(super) to_local: Vec<u16>,
     /// Fields that only the application's type has; nodes get them one by one.
@@ -101,6 +104,7 @@ impl Name for Namer<'_> {
 /// or draws them, but they are held. The second part names a type that is not known here.
 pub(super) fn local_type(
     graph: &Graph,
+    herds: &mut Herds,
     record: &TypeRecord,
     find: &mut Finder<'_>,
 ) -> Result<(LocalType, Option<String>), ReplicaError> {
@@ -111,12 +115,16 @@ pub(super) fn local_type(
             Ok((*index, plain.field(find).map_err(|fault| damaged(format!("type `{}`: {fault}", record.name)))?))
         })
         .collect::<Result<_, ReplicaError>>()?;
+    if !fields.is_sorted_by(|(before, _), (after, _)| before < after) {
+        return Err(damaged(format!("type `{}`: its fields are out of order", record.name)));
+    }
     let known = graph.types().get(&record.name).ok();
     let is_unknown = known.is_none();
     let node_type = known.unwrap_or_else(|| {
         let declared = NodeType::new(record.name.as_str(), "Declared by the application.");
         Arc::new(declared.fields(fields.iter().map(|(_, field)| field.clone())))
     });
+    let herd = herds.declare(fields.iter().map(|(index, field)| (*index, field.field_type)));
     let mut to_local = vec![NONE; fields.iter().map(|(index, _)| *index as usize + 1).max().unwrap_or(0)];
     let (mut extra, mut defaults) = (Vec::new(), Vec::new());
     for (index, field) in fields {
@@ -139,5 +147,5 @@ pub(super) fn local_type(
         }
     }
     // A type that the graph does not know yet may be one of a script: it is news, but no fault.
-    Ok((LocalType { node_type, to_local, extra, defaults }, is_unknown.then(|| record.name.clone())))
+    Ok((LocalType { node_type, herd, to_local, extra, defaults }, is_unknown.then(|| record.name.clone())))
 }

@@ -10,7 +10,7 @@ impl Graph {
         if node.local != local {
             node.local = local;
             let revision = self.changes.next();
-            self.changes.wrote(slot_of(id), revision);
+            self.changes.reshaped(slot_of(id), revision);
         }
         Ok(())
     }

@@ -17,12 +17,14 @@ mod bulk;
 mod deeds;
 mod difference;
 mod flat;
+mod herd;
 mod learn;
 mod local;
 mod mirror;
 mod packet;
 mod publisher;
 mod routes;
+mod runs;
 mod shares;
 
 pub use apply::Replica;

@@ -1,17 +1,24 @@
 //! What a packet is made of, and its bytes.
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use super::bulk::Bulk;
+use super::runs::{RunWriter, Runs};
 use super::{ReplicaError, damaged};
 use crate::FieldType;
 use crate::codec::{PlainField, field_type_named};
 
 const MAGIC: [u8; 4] = *b"UMBf";
-const VERSION: u16 = 1;
-/// Magic, version, checksum, length of the head.
-const HEAD: usize = 4 + 2 + 8 + 4;
+const VERSION: u16 = 2;
+/// What is checked by the checksum begins after magic, version and checksum.
+const CHECKED: usize = 4 + 2 + 8;
+/// The length of the head follows, and then the values; the head comes last, since it tells of all of them.
+const VALUES: usize = CHECKED + 4;
 
 /// A field: the node's number in the application, and the field's index there.
 pub(super) type Place = (u64, u16);
@@ -43,23 +50,151 @@ pub(super) struct Head {
     pub(super) routes: Vec<(Place, Place, bool)>,
     /// Long values, by their hash.
     pub(super) long: Vec<(Place, u64)>,
+    /// Short ones, in the order in which they lie in the packet.
+    pub(super) groups: Vec<GroupRecord>,
 }
 
-/// Values of one field type, side by side.
+/// Values of one field of many nodes, side by side, and then the runs of those nodes.
+#[derive(Serialize, Deserialize)]
+pub(super) struct GroupRecord {
+    field_type: String,
+    pub(super) field: FieldOf,
+    value_bytes: u32,
+    run_bytes: u32,
+}
+
+/// Which field of its nodes a group holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub(super) enum FieldOf {
+    /// One that all nodes of a type have, by its index there.
+    Type(u16),
+    /// One that single nodes have beside it.
+    Node(u16),
+}
+
+/// Values that come one by one, side by side.
 #[derive(Default)]
 pub(super) struct Group {
-    /// The node's slot in the application, and the field's index there.
-    pub(super) places: Vec<(u32, u16)>,
-    pub(super) bytes: Vec<u8>,
+    pub(super) values: Vec<u8>,
+    pub(super) runs: RunWriter,
 }
 
-/// A packet that was read; it borrows the bytes of the values.
+/// A packet in the making.
+pub(super) struct Draft {
+    pub(super) head: Head,
+    pub(super) groups: BTreeMap<(FieldType, FieldOf), Group>,
+    bytes: Vec<u8>,
+}
+
+impl Draft {
+    /// An empty one, for so many bytes as a rule.
+    pub(super) fn new(usual_length: usize) -> Draft {
+        let mut bytes = Vec::with_capacity(usual_length + usual_length / 8 + 256);
+        bytes.resize(VALUES, 0);
+        Draft { head: Head::default(), groups: BTreeMap::new(), bytes }
+    }
+
+    /// Appends a group whose values a function writes.
+    pub(super) fn group(&mut self, field_type: FieldType, field: FieldOf, write: impl FnOnce(&mut Vec<u8>, &mut RunWriter)) {
+        let start = self.bytes.len();
+        let mut runs = RunWriter::default();
+        write(&mut self.bytes, &mut runs);
+        self.end_group(field_type, field, start, &runs);
+    }
+
+    fn end_group(&mut self, field_type: FieldType, field: FieldOf, start: usize, runs: &RunWriter) {
+        if runs.is_empty() {
+            return;
+        }
+        let end = self.bytes.len();
+        runs.write(&mut self.bytes);
+        let (value_bytes, run_bytes) = ((end - start) as u32, (self.bytes.len() - end) as u32);
+        self.head.groups.push(GroupRecord { field_type: field_type.to_string(), field, value_bytes, run_bytes });
+    }
+
+    /// All of it as bytes.
+    pub(super) fn finish(mut self) -> Vec<u8> {
+        for ((field_type, field), group) in std::mem::take(&mut self.groups) {
+            let start = self.bytes.len();
+            self.bytes.extend_from_slice(&group.values);
+            self.end_group(field_type, field, start, &group.runs);
+        }
+        let head = postcard::to_stdvec(&self.head).unwrap_or_default();
+        let mut bytes = self.bytes;
+        bytes.extend_from_slice(&head);
+        bytes[..4].copy_from_slice(&MAGIC);
+        bytes[4..6].copy_from_slice(&VERSION.to_le_bytes());
+        bytes[CHECKED..VALUES].copy_from_slice(&(head.len() as u32).to_le_bytes());
+        let checksum = xxh3_64_with_seed(&bytes[CHECKED..], VERSION as u64);
+        bytes[6..CHECKED].copy_from_slice(&checksum.to_le_bytes());
+        bytes
+    }
+}
+
+/// A packet that was read.
 pub struct Packet<'a> {
     pub(super) head: Head,
-    pub(super) groups: Vec<(FieldType, &'a [u8], &'a [u8])>,
+    bytes: Cow<'a, [u8]>,
+    groups: Vec<GroupAt>,
 }
 
-impl Packet<'_> {
+/// Where a group lies in the bytes.
+struct GroupAt {
+    field_type: FieldType,
+    field: FieldOf,
+    values: Range<usize>,
+    runs: Range<usize>,
+}
+
+/// A group that was read.
+#[derive(Clone, Copy)]
+pub(super) struct GroupRead<'a> {
+    pub(super) field_type: FieldType,
+    pub(super) field: FieldOf,
+    pub(super) values: &'a [u8],
+    pub(super) runs: Runs<'a>,
+}
+
+impl<'a> Packet<'a> {
+    /// Reads a packet and checks it. Takes its bytes, or borrows them.
+    pub fn read(bytes: impl Into<Cow<'a, [u8]>>) -> Result<Packet<'a>, ReplicaError> {
+        let bytes = bytes.into();
+        if bytes.len() < VALUES || bytes[..4] != MAGIC {
+            return Err(ReplicaError::NotAPacket);
+        }
+        let found = u16::from_le_bytes([bytes[4], bytes[5]]);
+        if found != VERSION {
+            return Err(ReplicaError::WrongVersion { found, ours: VERSION });
+        }
+        if xxh3_64_with_seed(&bytes[CHECKED..], VERSION as u64).to_le_bytes() != bytes[6..CHECKED] {
+            return Err(damaged("its checksum is wrong"));
+        }
+        let length = u32::from_le_bytes(std::array::from_fn(|place| bytes[CHECKED + place])) as usize;
+        let start = bytes.len().checked_sub(length).filter(|start| *start >= VALUES).ok_or_else(|| damaged("it is cut off"))?;
+        let head: Head = postcard::from_bytes(&bytes[start..]).map_err(|error| damaged(error.to_string()))?;
+        let mut groups = Vec::with_capacity(head.groups.len());
+        let mut at = VALUES;
+        for record in &head.groups {
+            let name = &record.field_type;
+            let field_type = field_type_named(name).ok_or_else(|| damaged(format!("there is no field type `{name}`")))?;
+            let values = at..at.saturating_add(record.value_bytes as usize);
+            let runs = values.end..values.end.saturating_add(record.run_bytes as usize);
+            at = runs.end;
+            groups.push(GroupAt { field_type, field: record.field, values, runs });
+        }
+        if at != start {
+            return Err(damaged("its values are cut off, or too many"));
+        }
+        Ok(Packet { head, bytes, groups })
+    }
+
+    pub(super) fn groups(&self) -> impl Iterator<Item = Result<GroupRead<'_>, ReplicaError>> {
+        self.groups.iter().map(|GroupAt { field_type, field, values, runs }| {
+            let runs = Runs::read(&self.bytes[runs.clone()])?;
+            Ok(GroupRead { field_type: *field_type, field: *field, values: &self.bytes[values.clone()], runs })
+        })
+    }
+
     /// The number of the frame.
     pub fn frame(&self) -> u64 {
         self.head.frame
@@ -73,80 +208,5 @@ impl Packet<'_> {
     /// Hashes of long values that must be learned before the packet can be applied.
     pub fn missing(&self, bulk: &Bulk) -> Vec<u64> {
         self.head.needs.iter().copied().filter(|hash| !bulk.has(*hash)).collect()
-    }
-}
-
-pub(super) fn write(head: &Head, groups: &std::collections::BTreeMap<FieldType, Group>) -> Vec<u8> {
-    let mut bytes =
-        Vec::with_capacity(256 + groups.values().map(|group| group.bytes.len() + 6 * group.places.len()).sum::<usize>());
-    bytes.resize(HEAD, 0);
-    bytes = postcard::to_extend(head, bytes).unwrap_or_default();
-    let length = (bytes.len() - HEAD) as u32;
-    for (field_type, group) in groups.iter().filter(|(_, group)| !group.places.is_empty()) {
-        let name = field_type.to_string();
-        bytes.push(name.len() as u8);
-        bytes.extend_from_slice(name.as_bytes());
-        bytes.extend_from_slice(&(group.places.len() as u32).to_le_bytes());
-        bytes.extend_from_slice(&(group.bytes.len() as u32).to_le_bytes());
-        for (slot, index) in &group.places {
-            bytes.extend_from_slice(&slot.to_le_bytes());
-            bytes.extend_from_slice(&index.to_le_bytes());
-        }
-        bytes.extend_from_slice(&group.bytes);
-    }
-    bytes[..4].copy_from_slice(&MAGIC);
-    bytes[4..6].copy_from_slice(&VERSION.to_le_bytes());
-    bytes[14..18].copy_from_slice(&length.to_le_bytes());
-    let checksum = xxh3_64_with_seed(&bytes[14..], VERSION as u64);
-    bytes[6..14].copy_from_slice(&checksum.to_le_bytes());
-    bytes
-}
-
-/// The places of a group.
-pub(super) fn places(bytes: &[u8]) -> impl Iterator<Item = (u32, u16)> {
-    bytes
-        .chunks_exact(6)
-        .map(|place| (u32::from_le_bytes([place[0], place[1], place[2], place[3]]), u16::from_le_bytes([place[4], place[5]])))
-}
-
-/// Takes bytes off the front.
-fn take<'a>(rest: &mut &'a [u8], count: usize) -> Result<&'a [u8], ReplicaError> {
-    let (taken, after) = rest.split_at_checked(count).ok_or_else(|| damaged("it is cut off"))?;
-    *rest = after;
-    Ok(taken)
-}
-
-fn number(rest: &mut &[u8]) -> Result<usize, ReplicaError> {
-    let bytes = take(rest, 4)?;
-    Ok(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as usize)
-}
-
-impl<'a> Packet<'a> {
-    /// Reads a packet and checks it.
-    pub fn read(bytes: &'a [u8]) -> Result<Packet<'a>, ReplicaError> {
-        let mut rest = bytes;
-        if bytes.len() < HEAD || take(&mut rest, 4)? != MAGIC {
-            return Err(ReplicaError::NotAPacket);
-        }
-        let found = u16::from_le_bytes([bytes[4], bytes[5]]);
-        if found != VERSION {
-            return Err(ReplicaError::WrongVersion { found, ours: VERSION });
-        }
-        if xxh3_64_with_seed(&bytes[14..], VERSION as u64).to_le_bytes() != bytes[6..14] {
-            return Err(damaged("its checksum is wrong"));
-        }
-        rest = &bytes[14..];
-        let length = number(&mut rest)?;
-        let head = postcard::from_bytes(take(&mut rest, length)?).map_err(|error| damaged(error.to_string()))?;
-        let mut groups = Vec::new();
-        while !rest.is_empty() {
-            let length = take(&mut rest, 1)?[0] as usize;
-            let name = String::from_utf8_lossy(take(&mut rest, length)?);
-            let field_type = field_type_named(&name).ok_or_else(|| damaged(format!("there is no field type `{name}`")))?;
-            let (count, length) = (number(&mut rest)?, number(&mut rest)?);
-            let places = take(&mut rest, count.saturating_mul(6))?;
-            groups.push((field_type, places, take(&mut rest, length)?));
-        }
-        Ok(Packet { head, groups })
     }
 }

@@ -1,16 +1,18 @@
 //! From a graph to packets.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 
 use slotmap::Key;
 
 use super::bulk::{ImageHashes, LONG, Offered, hash_of_value, message_of_image, message_of_value};
-use super::flat::flat_bytes;
-use super::packet::{Group, Head, Place, TypeRecord, write};
+use super::flat::{gather_flat, put_flat, share_of_flat};
+use super::herd::Herds;
+use super::packet::{Draft, FieldOf, Place, TypeRecord};
 use super::routes::KnownRoutes;
-use super::shares::{Shares, field_share};
+use super::shares::field_share;
 use crate::codec::{Name, PlainField, Ref, to_bytes};
+use crate::column::FREE;
 use crate::graph::Node;
 use crate::{Changes, Field, FieldId, FieldType, Graph, Image, NodeId, NodeType, Revision};
 
@@ -45,13 +47,6 @@ impl Name for Names<'_> {
     }
 }
 
-/// A packet in the making.
-#[derive(Default)]
-struct Draft {
-    head: Head,
-    groups: BTreeMap<FieldType, Group>,
-}
-
 /// Makes packets of what happens to one graph.
 #[derive(Default)]
 pub struct Publisher {
@@ -59,10 +54,21 @@ pub struct Publisher {
     mark: Revision,
     frame: u64,
     known: Vec<Option<Known>>,
-    /// Types that have a number, by address; the reference keeps it from being used again.
-    types: HashMap<usize, (Arc<NodeType>, u32)>,
+    /// By number; the reference keeps their addresses from being used again.
+    types: Vec<Arc<NodeType>>,
+    /// Numbers of types, by address.
+    type_numbers: HashMap<usize, u32>,
     routes: KnownRoutes,
-    shares: Shares,
+    /// By the same numbers.
+    herds: Herds,
+    /// Nodes with fields of their own, by slot.
+    with_dynamic: BTreeSet<u32>,
+    /// Slots of nodes that came with this frame: all of them was told already.
+    new: HashSet<u32>,
+    /// Slots and places of nodes of each herd that were written; here so that the memory is used again.
+    written: Vec<Vec<(u32, u32)>>,
+    /// Bytes of the last packet.
+    usual_length: usize,
     hashes: ImageHashes,
     offered: Offered,
     /// What fields hold of what is offered.
@@ -77,7 +83,7 @@ impl Publisher {
 
     /// The hash of all that replicas know.
     pub fn hash(&self) -> u64 {
-        self.shares.sum()
+        self.herds.sum()
     }
 
     /// The number of the last frame.
@@ -93,17 +99,41 @@ impl Publisher {
     /// The next frame: what was written since the last one. To be called between evaluations.
     pub fn frame(&mut self, graph: &Graph) -> Vec<u8> {
         self.frame += 1;
-        let mut draft = Draft::default();
+        let mut draft = Draft::new(self.usual_length);
+        self.new.clear();
+        let is_reshaped = graph.changes.shape() > self.mark || self.frame == 1;
+        let fields_changed = is_reshaped && self.reshape(graph, &mut draft);
+        self.values(graph, &mut draft);
+        if !is_reshaped {
+            self.dynamic_values(graph, &mut draft);
+        }
+        let known = &self.known;
+        let is_known = |field: FieldId| {
+            let number = field.node.data().as_ffi();
+            let is_node_known =
+                known.get(number as u32 as usize).and_then(Option::as_ref).is_some_and(|known| known.number == number);
+            is_node_known && graph.declaration(field).is_ok_and(|field| !field.local)
+        };
+        (draft.head.unrouted, draft.head.routes) = self.routes.update(graph, &mut self.herds, fields_changed, is_known);
+        self.mark = graph.revision();
+        let bytes = self.finish(graph, draft);
+        self.usual_length = bytes.len();
+        bytes
+    }
+
+    /// Nodes that came, went, or are made of something else now; true if fields came or went.
+    fn reshape(&mut self, graph: &Graph, draft: &mut Draft) -> bool {
         let nodes = match graph.changes_since(self.mark) {
             Changes::Nodes(nodes) => nodes,
             Changes::All => {
+                self.find_again(graph);
                 let gone = self.known.iter().flatten().map(|known| number_to_id(known.number)).filter(|id| !graph.contains(*id));
                 gone.chain(graph.nodes()).collect()
             }
         };
         let mut fields_changed = false;
         for id in &nodes {
-            let is_shown = graph.nodes.get(*id).is_some_and(|node| !node.local);
+            let is_shown = graph.nodes.get(*id).is_some_and(|node| !node.local && !self.is_of_other_type(*id, node));
             let number = id.data().as_ffi();
             if !is_shown && self.known_node(number).is_some() {
                 self.forget(number);
@@ -113,18 +143,79 @@ impl Publisher {
         }
         for id in &nodes {
             let Some(node) = graph.nodes.get(*id).filter(|node| !node.local) else { continue };
-            fields_changed |= self.node(graph, *id, node, &mut draft);
+            fields_changed |= self.node(graph, *id, node, draft);
         }
-        let known = &self.known;
-        let is_known = |field: FieldId| {
-            let number = field.node.data().as_ffi();
-            let is_node_known =
-                known.get(number as u32 as usize).and_then(Option::as_ref).is_some_and(|known| known.number == number);
-            is_node_known && graph.declaration(field).is_ok_and(|field| !field.local)
-        };
-        (draft.head.unrouted, draft.head.routes) = self.routes.update(graph, &mut self.shares, fields_changed, is_known);
-        self.mark = graph.revision();
-        self.finish(graph, draft)
+        fields_changed
+    }
+
+    /// The graph was restored: values of known nodes may lie elsewhere.
+    fn find_again(&mut self, graph: &Graph) {
+        for number in self.known.iter().flatten().map(|known| known.number) {
+            let Some(node) = graph.nodes.get(number_to_id(number)) else { continue };
+            self.herds.move_slots(number, |index| node.slots.get(index as usize).copied().unwrap_or(FREE));
+        }
+    }
+
+    /// A restored graph may hold another node of that number.
+    fn is_of_other_type(&self, id: NodeId, node: &Node) -> bool {
+        let seat = self.herds.seat(id.data().as_ffi());
+        seat.is_some_and(|seat| !Arc::ptr_eq(&self.types[seat.herd as usize], &node.node_type))
+    }
+
+    /// What was written to fields that nodes have by their types.
+    fn values(&mut self, graph: &Graph, draft: &mut Draft) {
+        self.written.resize_with(self.types.len(), Vec::new);
+        self.written.iter_mut().for_each(Vec::clear);
+        for slot in graph.changes.slots_since(self.mark) {
+            if let Some(seat) = self.herds.seats.get(slot as usize).filter(|seat| seat.number > 0)
+                && (self.new.is_empty() || !self.new.contains(&slot))
+            {
+                self.written[seat.herd as usize].push((slot, seat.place));
+            }
+        }
+        let written = std::mem::take(&mut self.written);
+        for (herd, nodes) in written.iter().enumerate().filter(|(_, nodes)| !nodes.is_empty()) {
+            for index in 0..self.herds.herds[herd].strands.len() as u16 {
+                if gather_flat(&graph.columns, &mut self.herds, herd, index, nodes, self.mark, draft).is_none() {
+                    self.others(graph, herd, index, nodes, draft);
+                }
+            }
+        }
+        self.written = written;
+    }
+
+    /// The same for a field that is not a few floats.
+    fn others(&mut self, graph: &Graph, herd: usize, index: u16, nodes: &[(u32, u32)], draft: &mut Draft) {
+        let Some((numbers, strand)) = self.herds.herds[herd].strand_mut(index) else { return };
+        let revisions = graph.columns.revisions(strand.field_type);
+        let places = nodes.iter().map(|(_, place)| *place as usize);
+        let written: Vec<(u64, u32)> = places
+            .filter(|place| revisions[strand.slots[*place] as usize] > self.mark)
+            .map(|place| (numbers[place], strand.slots[place]))
+            .collect();
+        let node_type = self.types[herd].clone();
+        for (number, slot) in written {
+            self.value(graph, (number, index), &node_type.fields[index as usize], slot, draft, Purpose::Frame);
+        }
+    }
+
+    /// What was written to fields that single nodes have, while none came or went.
+    fn dynamic_values(&mut self, graph: &Graph, draft: &mut Draft) {
+        for slot in self.with_dynamic.iter().copied().filter(|slot| graph.changes.node(*slot) > self.mark).collect::<Vec<_>>() {
+            let Some(node) = graph.nodes.get(graph.ids[slot as usize]) else { continue };
+            self.dynamic_of(graph, self.herds.seats[slot as usize].number, node, &[], draft);
+        }
+    }
+
+    /// Values of fields of one node's own: new ones, and those that were written.
+    fn dynamic_of(&mut self, graph: &Graph, number: u64, node: &Node, added: &[u16], draft: &mut Draft) {
+        for (index, field) in node.fields().skip_while(|(index, _)| (*index as usize) < node.node_type.fields.len()) {
+            let slot = node.slots[index as usize];
+            let revision = graph.columns.revisions(field.field_type)[slot as usize];
+            if !field.local && (revision > self.mark || added.contains(&index)) {
+                self.value(graph, (number, index), field, slot, draft, Purpose::Frame);
+            }
+        }
     }
 
     /// Everything as of the last frame; `None` if the graph was written since.
@@ -132,16 +223,16 @@ impl Publisher {
         if graph.revision() != self.mark {
             return None;
         }
-        let mut draft = Draft::default();
+        let mut draft = Draft::new(self.usual_length);
         draft.head.is_snapshot = true;
-        let mut types: Vec<_> = self.types.values().cloned().collect();
-        types.sort_unstable_by_key(|(_, number)| *number);
-        draft.head.types = types.iter().map(|(node_type, number)| (*number, self.type_record(node_type))).collect();
+        for (number, node_type) in self.types.clone().iter().enumerate() {
+            draft.head.types.push((number as u32, self.type_record(node_type)));
+        }
         let numbers: Vec<u64> = self.known.iter().flatten().map(|known| known.number).collect();
         for number in numbers {
             let Some(node) = graph.nodes.get(number_to_id(number)) else { continue };
-            let node_type = self.types.get(&(Arc::as_ptr(&node.node_type) as usize)).map_or(0, |(_, number)| *number);
-            draft.head.created.push((number, node_type));
+            let herd = self.herds.seat(number).map_or(0, |seat| seat.herd);
+            draft.head.created.push((number, herd));
             if let Some(name) = &node.name {
                 draft.head.names.push((number, name.to_string()));
             }
@@ -166,7 +257,7 @@ impl Publisher {
         draft.head.hash = self.hash();
         draft.head.needs.sort_unstable();
         draft.head.needs.dedup();
-        write(&draft.head, &draft.groups)
+        draft.finish()
     }
 
     fn known_node(&self, number: u64) -> Option<&Known> {
@@ -175,10 +266,10 @@ impl Publisher {
 
     fn forget(&mut self, number: u64) {
         self.known[number as u32 as usize] = None;
+        self.with_dynamic.remove(&(number as u32));
         // Held values of a node are few; they are found by its fields.
-        let fields = self.shares.nodes[number as u32 as usize].as_ref().map_or(0, |node| node.fields.len());
-        (0..fields as u16).for_each(|index| self.let_go((number, index)));
-        self.shares.remove(number);
+        self.herds.fields(number).into_iter().for_each(|index| self.let_go((number, index)));
+        self.herds.remove(number);
     }
 
     fn let_go(&mut self, place: Place) {
@@ -202,14 +293,14 @@ impl Publisher {
                 self.known.resize_with(slot + 1, || None);
             }
             self.known[slot] = Some(Known { number, ..Known::default() });
-            self.shares.insert(number);
+            self.herds.insert(number, number as u32, node_type, |index| node.slots[index as usize]);
         }
         let mut fields_changed = is_new;
         if is_new || self.known_node(number).is_some_and(|known| known.name != node.name) {
             if node.name.is_some() || !is_new {
                 draft.head.names.push((number, node.name.as_deref().unwrap_or_default().into()));
             }
-            self.shares.set_own(number, &node.node_type.name, node.name.as_deref().unwrap_or_default());
+            self.herds.set_own(number, &node.node_type.name, node.name.as_deref().unwrap_or_default());
             if let Some(known) = &mut self.known[number as u32 as usize] {
                 known.name = node.name.clone();
             }
@@ -217,17 +308,24 @@ impl Publisher {
         let has_dynamic = !node.dynamic.is_empty() || self.known_node(number).is_some_and(|known| !known.dynamic.is_empty());
         let added = if has_dynamic { self.dynamic(number, node, draft) } else { Vec::new() };
         fields_changed |= has_dynamic;
-        for (index, field) in node.fields() {
-            let slot = node.slots[index as usize];
-            let revision = graph.columns.revisions(field.field_type)[slot as usize];
-            let is_unknown = is_new || (has_dynamic && added.contains(&index));
-            if field.local || !(is_unknown || revision > self.mark) {
-                continue;
-            }
-            let purpose = if is_new && revision <= node.created { Purpose::HashOnly } else { Purpose::Frame };
-            self.value(graph, (number, index), field, slot, draft, purpose);
+        if has_dynamic {
+            self.dynamic_of(graph, number, node, &added, draft);
+        }
+        if is_new {
+            self.all_of_new(graph, number, node, draft);
+            self.new.insert(number as u32);
         }
         fields_changed
+    }
+
+    /// Values of a new node. Replicas have its defaults from the type.
+    fn all_of_new(&mut self, graph: &Graph, number: u64, node: &Node, draft: &mut Draft) {
+        for (index, field) in node.node_type.fields.iter().enumerate().filter(|(_, field)| !field.local) {
+            let slot = node.slots[index];
+            let is_default = graph.columns.revisions(field.field_type)[slot as usize] <= node.created;
+            let purpose = if is_default { Purpose::HashOnly } else { Purpose::Frame };
+            self.value(graph, (number, index as u16), field, slot, draft, purpose);
+        }
     }
 
     /// Brings dynamic fields up to date; gives the indices of new ones.
@@ -238,6 +336,11 @@ impl Publisher {
         let declared = |field: &Field| (field.name.clone(), field.field_type, field.choices.clone());
         let now: Vec<Option<Declared>> = node.dynamic.iter().map(|field| field.as_ref().filter(is_shown).map(declared)).collect();
         known.dynamic = now.clone();
+        if now.is_empty() {
+            self.with_dynamic.remove(&(number as u32));
+        } else {
+            self.with_dynamic.insert(number as u32);
+        }
         let mut added = Vec::new();
         for place in 0..before.len().max(now.len()) {
             let (before, now) = (before.get(place).unwrap_or(&None), now.get(place).unwrap_or(&None));
@@ -248,7 +351,7 @@ impl Publisher {
             if before.is_some() {
                 draft.head.fields_removed.push((number, index));
                 self.let_go((number, index));
-                self.shares.set_field(number, index, 0);
+                self.herds.set_field(number, index, 0);
             }
             if let (Some(_), Some(field)) = (now, node.field(index)) {
                 let plain = self.plain(field);
@@ -265,11 +368,14 @@ impl Publisher {
 
     /// The number of a type, which is declared where it is new.
     fn node_type(&mut self, node_type: &Arc<NodeType>, draft: &mut Draft) -> u32 {
-        if let Some((_, number)) = self.types.get(&(Arc::as_ptr(node_type) as usize)) {
+        let address = Arc::as_ptr(node_type) as usize;
+        if let Some(number) = self.type_numbers.get(&address) {
             return *number;
         }
-        let number = self.types.len() as u32;
-        self.types.insert(Arc::as_ptr(node_type) as usize, (node_type.clone(), number));
+        let shown = node_type.fields.iter().enumerate().filter(|(_, field)| !field.local);
+        let number = self.herds.declare(shown.map(|(index, field)| (index as u16, field.field_type)));
+        self.types.push(node_type.clone());
+        self.type_numbers.insert(address, number);
         let record = self.type_record(node_type);
         draft.head.types.push((number, record));
         number
@@ -283,25 +389,27 @@ impl Publisher {
 
     /// Puts a value into its group, or by its content if it is long.
     fn value(&mut self, graph: &Graph, place: Place, field: &Field, slot: u32, draft: &mut Draft, purpose: Purpose) {
-        let group = draft.groups.entry(field.field_type).or_default();
-        if let Some(flat) = flat_bytes(&graph.columns, field.field_type, slot) {
+        let (columns, is_declared) = (&graph.columns, self.herds.is_declared(place));
+        let field_of = if is_declared { FieldOf::Type(place.1) } else { FieldOf::Node(place.1) };
+        let group = draft.groups.entry((field.field_type, field_of)).or_default();
+        if let Some(share) = share_of_flat(columns, field.field_type, slot, place) {
             if purpose != Purpose::Snapshot {
-                self.shares.set_field(place.0, place.1, field_share(place.0, place.1, flat.as_slice()));
+                self.herds.set_field(place.0, place.1, share);
             }
             if purpose != Purpose::HashOnly {
-                group.bytes.extend_from_slice(flat.as_slice());
-                group.places.push((place.0 as u32, place.1));
+                put_flat(columns, field.field_type, slot, &mut group.values);
+                group.runs.push(place.0 as u32);
             }
             return;
         }
-        let value = graph.columns.value(field.field_type, slot);
-        let start = group.bytes.len();
+        let value = columns.value(field.field_type, slot);
+        let start = group.values.len();
         let mut names = Names { hashes: &mut self.hashes, images: Vec::new() };
-        group.bytes = to_bytes(&value, field, &mut names, std::mem::take(&mut group.bytes));
+        group.values = to_bytes(&value, field, &mut names, std::mem::take(&mut group.values));
         let images = names.images;
-        let bytes = &group.bytes[start..];
+        let bytes = &group.values[start..];
         if purpose != Purpose::Snapshot {
-            self.shares.set_field(place.0, place.1, field_share(place.0, place.1, bytes));
+            self.herds.set_field(place.0, place.1, field_share(place.0, place.1, bytes));
         }
         let is_long = bytes.len() > LONG;
         let long = is_long.then(|| hash_of_value(bytes));
@@ -325,12 +433,12 @@ impl Publisher {
             }
         }
         if purpose == Purpose::HashOnly {
-            group.bytes.truncate(start);
+            group.values.truncate(start);
         } else if let Some(hash) = long.filter(|_| by_content) {
-            group.bytes.truncate(start);
+            group.values.truncate(start);
             draft.head.long.push((place, hash));
         } else {
-            group.places.push((place.0 as u32, place.1));
+            group.runs.push(place.0 as u32);
         }
     }
 }

@@ -4,8 +4,9 @@ use std::collections::HashMap;
 
 use slotmap::Key;
 
+use super::herd::Herds;
 use super::packet::Place;
-use super::shares::{Shares, route_share};
+use super::shares::route_share;
 use crate::{FieldId, Graph, RouteId, Strength};
 
 /// A route as replicas know it: from, to, weak.
@@ -30,7 +31,7 @@ impl KnownRoutes {
     pub(super) fn update(
         &mut self,
         graph: &Graph,
-        shares: &mut Shares,
+        herds: &mut Herds,
         fields_changed: bool,
         is_known: impl Fn(FieldId) -> bool,
     ) -> (Vec<(Place, Place)>, Vec<Wire>) {
@@ -45,7 +46,7 @@ impl KnownRoutes {
             let stays = routes.all.get(*id).is_some_and(is_shown);
             if !stays {
                 gone.push((*from, *to));
-                shares.subtract(route_share(*from, *to, *weak));
+                herds.subtract(route_share(*from, *to, *weak));
             }
             stays
         });
@@ -55,7 +56,7 @@ impl KnownRoutes {
                 continue;
             }
             let wire = (place(route.from), place(route.to), route.strength == Strength::Weak);
-            shares.add(route_share(wire.0, wire.1, wire.2));
+            herds.add(route_share(wire.0, wire.1, wire.2));
             self.all.insert(id, wire);
             came.push((route.ordinal, wire));
         }

@@ -1,28 +1,43 @@
-//! One hash for all values: a sum of a hash for each field, so that order plays no part and a frame costs what was written in it.
+//! What each field and route adds to the one hash of all values: a sum, so that order plays no part and a frame costs what was written
+//! in it.
 
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-/// What one node adds to the sum.
-#[derive(Clone, Debug, Default)]
-pub(super) struct NodeShares {
-    /// The node's number in the application.
-    pub(super) number: u64,
-    /// Of its type and name.
-    pub(super) own: u64,
-    /// By the field's index in the application; zero where none is.
-    pub(super) fields: Vec<u64>,
+/// Odd numbers with as many ones as zeros in each byte, of wyhash.
+const SECRETS: [u64; 3] = [0x2d35_8dcc_aa6c_78a5, 0x8bb8_4b93_962e_acc9, 0x4b33_a62e_d433_d4a3];
+
+/// Both halves of a product: the step of wyhash (Wang Yi, final version 4).
+#[inline]
+fn fold(a: u64, b: u64) -> u64 {
+    let product = a as u128 * b as u128;
+    product as u64 ^ (product >> 64) as u64
 }
 
-/// Of all nodes, by their slot in the application.
-#[derive(Debug, Default)]
-pub(super) struct Shares {
-    pub(super) nodes: Vec<Option<NodeShares>>,
-    sum: u64,
+#[inline]
+fn seed_of(number: u64, index: u16) -> u64 {
+    number.wrapping_mul(SECRETS[0]) ^ (index as u64 + 1).wrapping_mul(SECRETS[1])
 }
 
-/// What a field adds.
+/// What a field adds. `number` is its node's in the application, `index` the field's place there.
 pub(super) fn field_share(number: u64, index: u16, bytes: &[u8]) -> u64 {
-    xxh3_64_with_seed(bytes, number.rotate_left(17) ^ (index as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15)).max(1)
+    xxh3_64_with_seed(bytes, seed_of(number, index)).max(1)
+}
+
+/// What a field of a few floats adds.
+#[inline]
+pub(super) fn flat_share<const COUNT: usize>(number: u64, index: u16, floats: [f32; COUNT]) -> u64 {
+    let word = |place: usize| floats.get(place).map_or(0, |float| float.to_bits() as u64);
+    let mut state = seed_of(number, index);
+    for place in (0..COUNT).step_by(4) {
+        let (low, high) = (word(place) | word(place + 1) << 32, word(place + 2) | word(place + 3) << 32);
+        state = fold(low ^ SECRETS[2], high ^ state);
+    }
+    fold(state ^ SECRETS[0], SECRETS[1] ^ COUNT as u64).max(1)
+}
+
+/// What a node adds by its type and name.
+pub(super) fn own_share(number: u64, type_name: &str, name: &str) -> u64 {
+    xxh3_64_with_seed(name.as_bytes(), !number) ^ xxh3_64_with_seed(type_name.as_bytes(), number)
 }
 
 /// What a route adds.
@@ -31,60 +46,37 @@ pub(super) fn route_share(from: (u64, u16), to: (u64, u16), weak: bool) -> u64 {
     xxh3_64_with_seed(&words.map(u64::to_le_bytes).concat(), 1)
 }
 
-impl Shares {
-    pub(super) fn sum(&self) -> u64 {
-        self.sum
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
 
-    pub(super) fn add(&mut self, share: u64) {
-        self.sum = self.sum.wrapping_add(share);
-    }
-
-    pub(super) fn subtract(&mut self, share: u64) {
-        self.sum = self.sum.wrapping_sub(share);
-    }
-
-    /// Begins a node.
-    pub(super) fn insert(&mut self, number: u64) {
-        let slot = number as u32 as usize;
-        if self.nodes.len() <= slot {
-            self.nodes.resize_with(slot + 1, || None);
+    #[test]
+    fn values_places_and_single_bits_all_count() {
+        let mut seen = HashSet::new();
+        let mut check = |share: u64| assert!(seen.insert(share) && share != 0);
+        let values = [[0.0f32, 0.0, 0.0], [0.0, -0.0, 0.0], [1.0, 2.0, 3.0], [3.0, 2.0, 1.0], [2.0, 1.0, 3.0]];
+        for number in [1 << 32, 1 << 32 | 1, 3 << 32 | 1] {
+            for index in [0, 1, 255] {
+                values.iter().for_each(|value| check(flat_share(number, index, *value)));
+                check(flat_share(number, index, [0.0f32; 4]));
+                check(flat_share(number, index, [0.0f32; 16]));
+            }
         }
-        self.nodes[slot] = Some(NodeShares { number, ..NodeShares::default() });
-    }
-
-    /// Takes a node out, with all that it added.
-    pub(super) fn remove(&mut self, number: u64) {
-        let Some(place) = self.nodes.get_mut(number as u32 as usize) else { return };
-        if let Some(node) = place.take_if(|node| node.number == number) {
-            self.subtract(node.fields.iter().fold(node.own, |sum, share| sum.wrapping_add(*share)));
+        for bit in 0..512 {
+            let mut words = [0u32; 16];
+            words[bit / 32] = 1 << (bit % 32);
+            check(flat_share(7, 0, words.map(f32::from_bits)));
         }
     }
 
-    pub(super) fn set_own(&mut self, number: u64, type_name: &str, name: &str) {
-        let own = xxh3_64_with_seed(name.as_bytes(), !number) ^ xxh3_64_with_seed(type_name.as_bytes(), number);
-        if let Some(node) = self.node_mut(number) {
-            let before = std::mem::replace(&mut node.own, own);
-            self.sum = self.sum.wrapping_sub(before).wrapping_add(own);
+    #[test]
+    fn half_of_the_bits_change_with_one() {
+        let mut changed = 0;
+        for bit in 0..96 {
+            let of = |word: usize| f32::from_bits(if bit / 32 == word { 1 << (bit % 32) } else { 0 });
+            changed += (flat_share(5, 2, [0.0; 3]) ^ flat_share(5, 2, [of(0), of(1), of(2)])).count_ones();
         }
-    }
-
-    /// Sets what a field adds; zero takes it out.
-    pub(super) fn set_field(&mut self, number: u64, index: u16, share: u64) {
-        let Some(node) = self.node_mut(number) else { return };
-        if node.fields.len() <= index as usize {
-            node.fields.resize(index as usize + 1, 0);
-        }
-        let before = std::mem::replace(&mut node.fields[index as usize], share);
-        self.sum = self.sum.wrapping_sub(before).wrapping_add(share);
-    }
-
-    pub(super) fn field(&self, number: u64, index: u16) -> u64 {
-        let node = self.nodes.get(number as u32 as usize).and_then(Option::as_ref);
-        node.and_then(|node| node.fields.get(index as usize)).copied().unwrap_or(0)
-    }
-
-    fn node_mut(&mut self, number: u64) -> Option<&mut NodeShares> {
-        self.nodes.get_mut(number as u32 as usize)?.as_mut().filter(|node| node.number == number)
+        assert!((2500..3650).contains(&changed), "{changed} of 96 * 64");
     }
 }

@@ -13,7 +13,7 @@ use zenoh::qos::CongestionControl;
 use crate::cluster::line::{Answer, Line};
 use crate::cluster::message::{
     DEEDS, FRAME, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word, bytes_of, message_of,
-    unstamped,
+    stamped_packet,
 };
 use crate::cluster::ordered::Outbox;
 use crate::cluster::transport::{End, network};
@@ -86,8 +86,8 @@ pub struct Guest {
     replica: Option<Replica>,
     mirror: Option<Mirror>,
     /// A snapshot that waits for long values.
-    world: Option<(Word, Vec<u8>)>,
-    packets: BTreeMap<u64, Vec<u8>>,
+    world: Option<(Word, u64, Packet<'static>)>,
+    packets: BTreeMap<u64, Packet<'static>>,
     words: BTreeMap<u64, Word>,
     gap_since: Option<Instant>,
     /// Words of the frames that were taken over since the last `follow`.
@@ -188,18 +188,14 @@ impl Guest {
 
     fn handle(&mut self, arrived: Arrived) -> Result<Option<News>, ClusterError> {
         match arrived {
-            Arrived::Frame(bytes) => {
-                let frame = unstamped(&bytes).map(|(epoch, packet)| (epoch, Packet::read(packet)));
-                match frame {
-                    Some((epoch, Ok(packet))) if epoch == self.epoch => {
-                        let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
-                        self.line.ask_for_bulk(missing, Arrived::Bulk);
-                        self.packets.insert(frame, bytes);
-                    }
-                    Some((_, Err(error))) => tracing::error!("a frame cannot be used: {error}"),
-                    _ => {}
+            Arrived::Frame(bytes) => match stamped_packet(bytes) {
+                Ok((epoch, packet)) if epoch == self.epoch => {
+                    self.line.ask_for_bulk(packet.missing(&self.bulk), Arrived::Bulk);
+                    self.packets.insert(packet.frame(), packet);
                 }
-            }
+                Ok(_) => {}
+                Err(error) => tracing::error!("a frame cannot be used: {error}"),
+            },
             Arrived::Word(bytes) => match message_of::<Word>(&bytes) {
                 Ok(word) if word.epoch == self.epoch => {
                     if self.replica.is_some() && !word.guests.iter().any(|(id, ..)| *id == self.line.id) {
@@ -217,7 +213,10 @@ impl Guest {
             Arrived::World(Ok(bytes)) => {
                 self.refused_since = None;
                 let (word, snapshot) = message_of::<(Word, Vec<u8>)>(&bytes)?;
-                self.world = Some((word, snapshot));
+                match stamped_packet(snapshot) {
+                    Ok((epoch, packet)) => self.world = Some((word, epoch, packet)),
+                    Err(error) => tracing::error!("the world cannot be used: {error}"),
+                }
             }
             Arrived::World(Err(reason)) if reason.starts_with("there is an application") => {
                 let since = *self.refused_since.get_or_insert_with(Instant::now);
@@ -292,11 +291,10 @@ impl Guest {
         }
         let mut news = News::None;
         while let Some(next) = self.replica.as_ref().map(|replica| replica.frame() + 1) {
-            let (Some(bytes), true) = (self.packets.get(&next), self.words.contains_key(&next)) else { break };
-            let packet = unstamped(bytes).and_then(|(_, packet)| Packet::read(packet).ok());
-            let Some(packet) = packet.filter(|packet| packet.missing(&self.bulk).is_empty()) else { break };
+            let packet = self.packets.get(&next).filter(|packet| packet.missing(&self.bulk).is_empty());
+            let (Some(packet), true) = (packet, self.words.contains_key(&next)) else { break };
             let Some(replica) = &mut self.replica else { break };
-            match replica.apply(&packet, &self.bulk) {
+            match replica.apply(packet, &self.bulk) {
                 Ok(()) if replica.agrees() => {
                     self.gap_since = None;
                     news = News::Frame(replica.time_s());
@@ -326,15 +324,12 @@ impl Guest {
     }
 
     fn take_world(&mut self) -> Option<News> {
-        let (word, bytes) = self.world.as_ref()?;
-        let (epoch, packet) = unstamped(bytes)?;
-        let packet = Packet::read(packet).inspect_err(|error| tracing::error!("the world cannot be used: {error}")).ok()?;
-        let missing = packet.missing(&self.bulk);
+        let missing = self.world.as_ref()?.2.missing(&self.bulk);
         if !missing.is_empty() {
             self.line.ask_for_bulk(missing, Arrived::Bulk);
             return None;
         }
-        let word = word.clone();
+        let (word, epoch, packet) = self.world.take()?;
         let applied = word.guests.iter().find(|(id, ..)| *id == self.line.id).map_or(0, |(.., applied)| *applied);
         let is_first = self.epoch != epoch || self.mirror.is_none() || applied < self.applied;
         if is_first {
@@ -345,7 +340,6 @@ impl Guest {
             self.locks_asked.clear();
         }
         let made = Replica::new(&packet, self.types.clone(), &self.bulk);
-        self.world = None;
         let replica = made.inspect_err(|error| tracing::error!("the world cannot be used: {error}")).ok()?;
         let (frame, time_s) = (replica.frame(), replica.time_s());
         self.packets = self.packets.split_off(&(frame + 1));

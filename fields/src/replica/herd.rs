@@ -1,0 +1,203 @@
+//! The application's nodes as both ends know them: those of one type stand together, so that what is done with a field of many of them
+//! runs along arrays. Here is the hash of all values as well, with what each field adds to it.
+
+use std::collections::BTreeMap;
+
+use super::packet::Place;
+use super::shares::own_share;
+use crate::FieldType;
+
+/// Where a node stands; by its slot in the application.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Seat {
+    /// The node's number in the application; zero where nobody is.
+    pub(super) number: u64,
+    pub(super) herd: u32,
+    pub(super) place: u32,
+}
+
+/// A field of all nodes of a type, by their places.
+#[derive(Debug)]
+pub(super) struct Strand {
+    pub(super) field_type: FieldType,
+    /// In the column of this process.
+    pub(super) slots: Vec<u32>,
+    /// What each adds to the hash; zero while it is not known.
+    pub(super) shares: Vec<u64>,
+}
+
+/// Nodes of one type.
+#[derive(Debug)]
+pub(super) struct Herd {
+    numbers: Vec<u64>,
+    /// Slots of the nodes in this process.
+    nodes: Vec<u32>,
+    /// What each adds by its type and name.
+    own: Vec<u64>,
+    /// By the field's index in the application; none where replicas do not learn of it.
+    pub(super) strands: Vec<Option<Strand>>,
+}
+
+impl Herd {
+    /// A field of the nodes from a place on.
+    pub(super) fn rows(&mut self, place: usize, index: u16) -> Option<Rows<'_>> {
+        let Strand { field_type, slots, shares } = self.strands.get_mut(index as usize)?.as_mut()?;
+        let (numbers, nodes) = (&self.numbers[place..], &self.nodes[place..]);
+        Some(Rows { field_type: *field_type, numbers, nodes, slots: &slots[place..], shares: &mut shares[place..] })
+    }
+
+    /// A field of all nodes, with the nodes' numbers by their places.
+    #[inline]
+    pub(super) fn strand_mut(&mut self, index: u16) -> Option<(&[u64], &mut Strand)> {
+        Some((&self.numbers, self.strands.get_mut(index as usize)?.as_mut()?))
+    }
+}
+
+/// A field of some nodes that stand side by side.
+pub(super) struct Rows<'a> {
+    pub(super) field_type: FieldType,
+    pub(super) numbers: &'a [u64],
+    pub(super) nodes: &'a [u32],
+    pub(super) slots: &'a [u32],
+    pub(super) shares: &'a mut [u64],
+}
+
+/// All of them.
+#[derive(Debug, Default)]
+pub(super) struct Herds {
+    pub(super) seats: Vec<Seat>,
+    pub(super) herds: Vec<Herd>,
+    /// What fields add that only single nodes have.
+    loose: BTreeMap<Place, u64>,
+    sum: u64,
+}
+
+impl Herds {
+    /// The hash of all values, names, types and routes.
+    pub(super) fn sum(&self) -> u64 {
+        self.sum
+    }
+
+    pub(super) fn add(&mut self, share: u64) {
+        self.sum = self.sum.wrapping_add(share);
+    }
+
+    pub(super) fn subtract(&mut self, share: u64) {
+        self.sum = self.sum.wrapping_sub(share);
+    }
+
+    /// A new type, by the indices and types of its fields; gives its number here.
+    pub(super) fn declare(&mut self, fields: impl Iterator<Item = (u16, FieldType)>) -> u32 {
+        let mut strands = Vec::new();
+        for (index, field_type) in fields {
+            strands.resize_with(strands.len().max(index as usize + 1), || None);
+            strands[index as usize] = Some(Strand { field_type, slots: Vec::new(), shares: Vec::new() });
+        }
+        self.herds.push(Herd { numbers: Vec::new(), nodes: Vec::new(), own: Vec::new(), strands });
+        self.herds.len() as u32 - 1
+    }
+
+    /// A new node, which has the slot `node` here; `slot` says where in its column a field lies, by its index.
+    pub(super) fn insert(&mut self, number: u64, node: u32, herd: u32, slot: impl Fn(u16) -> u32) {
+        let at = number as u32 as usize;
+        if self.seats.len() <= at {
+            self.seats.resize(at + 1, Seat::default());
+        }
+        let Herd { numbers, nodes, own, strands } = &mut self.herds[herd as usize];
+        self.seats[at] = Seat { number, herd, place: numbers.len() as u32 };
+        numbers.push(number);
+        nodes.push(node);
+        own.push(0);
+        for (index, strand) in strands.iter_mut().enumerate() {
+            let Some(strand) = strand else { continue };
+            strand.slots.push(slot(index as u16));
+            strand.shares.push(0);
+        }
+    }
+
+    /// The fields of a node lie elsewhere now.
+    pub(super) fn move_slots(&mut self, number: u64, slot: impl Fn(u16) -> u32) {
+        let Some(seat) = self.seat(number) else { return };
+        for (index, strand) in self.herds[seat.herd as usize].strands.iter_mut().enumerate() {
+            let Some(strand) = strand else { continue };
+            strand.slots[seat.place as usize] = slot(index as u16);
+        }
+    }
+
+    /// Takes a node out, with all that it added.
+    pub(super) fn remove(&mut self, number: u64) {
+        let Some(Seat { herd, place, .. }) = self.seat(number) else { return };
+        self.seats[number as u32 as usize] = Seat::default();
+        let Herd { numbers, nodes, own, strands } = &mut self.herds[herd as usize];
+        let place = place as usize;
+        numbers.swap_remove(place);
+        nodes.swap_remove(place);
+        let mut gone = own.swap_remove(place);
+        for strand in strands.iter_mut().flatten() {
+            strand.slots.swap_remove(place);
+            gone = gone.wrapping_add(strand.shares.swap_remove(place));
+        }
+        if let Some(moved) = numbers.get(place) {
+            self.seats[*moved as u32 as usize].place = place as u32;
+        }
+        let loose: Vec<Place> = self.loose_of(number).map(|(index, _)| (number, index)).collect();
+        gone = loose.iter().fold(gone, |gone, place| gone.wrapping_add(self.loose.remove(place).unwrap_or(0)));
+        self.subtract(gone);
+    }
+
+    pub(super) fn set_own(&mut self, number: u64, type_name: &str, name: &str) {
+        let Some(seat) = self.seat(number) else { return };
+        let own = own_share(number, type_name, name);
+        let before = std::mem::replace(&mut self.herds[seat.herd as usize].own[seat.place as usize], own);
+        self.sum = self.sum.wrapping_sub(before).wrapping_add(own);
+    }
+
+    /// Sets what a field adds; zero takes it out.
+    pub(super) fn set_field(&mut self, number: u64, index: u16, share: u64) {
+        let Some(seat) = self.seat(number) else { return };
+        let strand = self.herds[seat.herd as usize].strands.get_mut(index as usize).and_then(Option::as_mut);
+        let before = match strand {
+            Some(strand) => std::mem::replace(&mut strand.shares[seat.place as usize], share),
+            None if share == 0 => self.loose.remove(&(number, index)).unwrap_or(0),
+            None => self.loose.insert((number, index), share).unwrap_or(0),
+        };
+        self.sum = self.sum.wrapping_sub(before).wrapping_add(share);
+    }
+
+    /// What a field adds.
+    pub(super) fn field(&self, number: u64, index: u16) -> u64 {
+        let Some(seat) = self.seat(number) else { return 0 };
+        match self.herds[seat.herd as usize].strands.get(index as usize).and_then(Option::as_ref) {
+            Some(strand) => strand.shares[seat.place as usize],
+            None => self.loose.get(&(number, index)).copied().unwrap_or(0),
+        }
+    }
+
+    /// Is it a field that all nodes of the type have?
+    pub(super) fn is_declared(&self, (number, index): Place) -> bool {
+        let strands = self.seat(number).map(|seat| &self.herds[seat.herd as usize].strands);
+        strands.and_then(|strands| strands.get(index as usize)).is_some_and(Option::is_some)
+    }
+
+    /// What a node adds by its type and name.
+    pub(super) fn own(&self, number: u64) -> u64 {
+        self.seat(number).map_or(0, |seat| self.herds[seat.herd as usize].own[seat.place as usize])
+    }
+
+    /// Indices of all fields of a node, in order.
+    pub(super) fn fields(&self, number: u64) -> Vec<u16> {
+        let Some(seat) = self.seat(number) else { return Vec::new() };
+        let strands = &self.herds[seat.herd as usize].strands;
+        let declared = strands.iter().enumerate().filter(|(_, strand)| strand.is_some()).map(|(index, _)| index as u16);
+        declared.chain(self.loose_of(number).map(|(index, _)| index)).collect()
+    }
+
+    fn loose_of(&self, number: u64) -> impl Iterator<Item = (u16, u64)> {
+        self.loose.range((number, 0)..=(number, u16::MAX)).map(|((_, index), share)| (*index, *share))
+    }
+
+    /// Where a node stands, if it does.
+    pub(super) fn seat(&self, number: u64) -> Option<Seat> {
+        self.seats.get(number as u32 as usize).copied().filter(|seat| seat.number == number && number > 0)
+    }
+}
