@@ -94,7 +94,7 @@ pub(crate) fn uniform_of(light: &Light, faces: (u32, u32)) -> uniforms::Light {
         cone_scale: 1.0 / (cos_inner - cos_outer).max(1e-4),
         first_face: faces.0,
         face_count: faces.1,
-        filter_width: match map.filter {
+        filter_width: match filter_of(light) {
             MapFilter::None => 0.0,
             MapFilter::Hardware => 1.0,
             MapFilter::Pcf4 => 2.0,
@@ -108,11 +108,16 @@ pub(crate) fn uniform_of(light: &Light, faces: (u32, u32)) -> uniforms::Light {
     }
 }
 
+/// Where volumes are soft, so is what they leave to maps.
+fn filter_of(light: &Light) -> MapFilter {
+    if maps_holes_only(light) && light.soft { MapFilter::Pcss } else { light.map.filter }
+}
+
 fn map_flags(light: &Light, face_count: u32) -> u32 {
     use uniforms::Light as L;
     let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
     flag(light.kind != LightKind::Directional && face_count == 6, L::MAP_CUBE)
         | flag(light.map.outside_in_shadow && light.map.frustum.is_some(), L::MAP_DARK_OUTSIDE)
-        | flag(light.map.filter == MapFilter::Poisson, L::MAP_POISSON)
-        | flag(light.map.filter == MapFilter::Pcss, L::MAP_PCSS)
+        | flag(filter_of(light) == MapFilter::Poisson, L::MAP_POISSON)
+        | flag(filter_of(light) == MapFilter::Pcss, L::MAP_PCSS)
 }

@@ -221,6 +221,21 @@ fn holes_are_left_to_maps() {
     }
 }
 
+/// Where volumes have penumbrae, leaves have them too.
+#[test]
+fn leaves_are_as_soft_as_volumes() {
+    let leaves: Vec<Drawable> = forest().into_iter().take(40).collect();
+    let half_lit = |soft: bool| {
+        let light = Light { soft, size: 0.05, shadows: ShadowMethod::Volume, ..sun(Vec3::new(0.4, -1.0, -0.3)) };
+        let scene = Scene { drawables: leaves.clone(), lights: vec![light], ..Default::default() };
+        let view = look(&format!("leaves_{soft}"), Vec3::new(2.0, 2.5, 2.0), Vec3::new(0.8, 0.0, -0.5), [160, 120]);
+        let shot = shoot(&scene, &Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view) });
+        shot.layers[0].rgba.chunks_exact(4).filter(|p| (30..225).contains(&p[0])).count()
+    };
+    let [hard, soft] = [half_lit(false), half_lit(true)];
+    assert!(hard > 100 && soft > 2 * hard, "{hard} pixels in half shadow, {soft} where it is soft");
+}
+
 /// How much of the light is wrong, in penumbrae and everywhere, by filter.
 #[test]
 fn penumbrae_follow_from_the_size_of_the_light() {
