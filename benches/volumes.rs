@@ -1,10 +1,11 @@
 //! What shadow volumes cost: harbour in seven channels, and the silhouette of a mesh of a million edges.
 //!
-//! `cargo bench --bench volumes`, with names of rows behind `--` to draw those alone. Rows are drawn in turns, so that all meet the same load of the machine; the ratio is the
-//! median of the frames' ratios, each to the first row's frame of its turn. Where the system tells, time is what all
-//! threads of the process spent on processors: with a software driver that is the frame, whatever else runs beside it.
+//! `cargo bench --bench volumes`, with the pixels of a channel behind `--`, such as `-- 1920x1080`, and names of rows to draw those
+//! alone. Rows are drawn in turns, so that all meet the same load of the machine; the ratio is the median of the frames' ratios, each
+//! to the first row's frame of its turn. With a software driver, time is what all threads of the process spent on processors, where
+//! the system tells: that is the frame, whatever else runs beside it. On a card it is the time until the frame is done.
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -26,7 +27,13 @@ type Row = (&'static str, Scene);
 fn main() -> Outcome<()> {
     let gpu = Gpu::new(None)?;
     println!("{}", gpu.info.name);
-    let (scene, pictures) = world("harbour")?;
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let size_of = |a: &String| {
+        let (width, height) = a.split_once('x')?;
+        Some([width.parse().ok()?, height.parse().ok()?])
+    };
+    let size = args.iter().find_map(size_of).unwrap_or([320, 256]);
+    let (scene, pictures) = harbour(size)?;
     let plain = VolumeSettings {
         counting: VolumeCounting::ZFail,
         culling: false,
@@ -54,9 +61,9 @@ fn main() -> Outcome<()> {
         ("map of 2048", with(&scene, ShadowMethod::Map, plain)),
         ("no shadows", with(&scene, ShadowMethod::None, plain)),
     ];
-    let only: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let rows: Vec<Row> = rows.into_iter().filter(|(name, _)| only.is_empty() || only.iter().any(|o| o == name)).collect();
-    table(&gpu, "harbour, seven channels of 320x256", rows, &pictures)?;
+    let only: Vec<&String> = args.iter().filter(|a| size_of(a).is_none()).collect();
+    let rows: Vec<Row> = rows.into_iter().filter(|(name, _)| only.is_empty() || only.iter().any(|o| *o == name)).collect();
+    table(&gpu, &format!("harbour, seven channels of {}x{}", size[0], size[1]), rows, &pictures)?;
 
     if !only.is_empty() {
         return Ok(());
@@ -128,6 +135,8 @@ fn table(gpu: &Gpu, title: &str, rows: Vec<Row>, pictures: &[Picture]) -> Outcom
 
 /// Seconds of a frame until the GPU is done with it.
 fn timed(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, pictures: &[Picture]) -> Outcome<(f64, FrameStats)> {
+    let is_software = gpu.info.device_type == wgpu::DeviceType::Cpu;
+    let processor_seconds = || if is_software { processor_seconds() } else { None };
     let (start, busy) = (Instant::now(), processor_seconds());
     let stats = renderer.render(scene, pictures)?;
     gpu.device.poll(wgpu::PollType::wait_indefinitely())?;
@@ -153,11 +162,13 @@ fn with(scene: &Scene, method: ShadowMethod, settings: VolumeSettings) -> Scene 
     scene
 }
 
-/// A world as the command shows it.
-fn world(name: &str) -> Outcome<(Scene, Vec<Picture>)> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/worlds").join(name).with_extension("rhai");
-    let mut world = World::load_file(&path)?;
+/// The harbour as the command shows it, with so many pixels in a channel.
+fn harbour(size: [u32; 2]) -> Outcome<(Scene, Vec<Picture>)> {
+    let mut world = World::load_file(Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/worlds/harbour.rhai"))?;
     world.step(0.0);
+    let graph = world.graph_mut();
+    let display = graph.find("bridge").ok_or("no bridge")?;
+    graph.set_named(display, "size", Vec2::new(size[0] as f32, size[1] as f32))?;
     let (mut extractor, mut scene, mut rig) = (Extractor::new(), Scene::default(), Rig::new());
     extractor.update(world.graph(), &mut scene);
     let wanted = Wanted { view: None, size: [320, 256], windows: &WindowSizes::new() };
