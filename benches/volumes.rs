@@ -221,7 +221,7 @@ fn ball_over_floor(world_from_ball: Mat4) -> Scene {
     };
     let light = Light { direction: Vec3::new(-0.4, -1.0, -0.3).normalize(), ..Light::default() };
     Scene {
-        drawables: vec![drawable(ball, world_from_ball), drawable(floor, Mat4::IDENTITY)],
+        drawables: vec![drawable(ball, world_from_ball), drawable(floor, Mat4::IDENTITY)].into(),
         lights: vec![light],
         ..Scene::default()
     }

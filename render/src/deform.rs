@@ -184,6 +184,13 @@ impl Deformer {
         self.deformed.get(&drawable)
     }
 
+    /// A deformed mesh is in use.
+    pub(crate) fn touch(&mut self, drawable: u32, frame: u64) {
+        if let Some(deformed) = self.deformed.get_mut(&drawable) {
+            deformed.last_used = frame;
+        }
+    }
+
     pub(crate) fn drop_unused(&mut self, frame: u64) {
         self.deformed.retain(|_, d| d.last_used + KEEP_FRAMES > frame);
     }

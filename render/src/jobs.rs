@@ -10,7 +10,7 @@ use crate::stats::Problems;
 use crate::uniforms;
 use crate::volumes::{Cone, Seen, Surface, VolumeCaster, VolumeJob, VolumeLight};
 use glam::{Mat4, Vec3, Vec4};
-use umbriel_scene::{Aabb, AlphaMode, Light, LightKind, Mesh, Scene, ShadowMethod, StencilMode, Topology};
+use umbriel_scene::{Aabb, AlphaMode, Light, LightKind, Mesh, Scene, ShadowMethod, StencilGroup, StencilMode, Topology};
 
 /// All jobs of the frame and what each is for. Films are added to `films`.
 pub(crate) fn jobs(
@@ -26,6 +26,10 @@ pub(crate) fn jobs(
     debug_assert_eq!(black, BLACK_FILM);
     let caster = |index: usize| caster(scene, draws, meshes, deformer, index);
     let (mut jobs, mut purposes) = (Vec::new(), Vec::new());
+    let is_film = |group: &StencilGroup| matches!(group.mode, StencilMode::Modulative(_));
+    if lights.order.len() == lights.in_surface_pass && !scene.stencil_groups.iter().any(is_film) {
+        return (jobs, purposes);
+    }
     let receivers = receivers(draws.drawn().map(|(i, _)| i), scene);
     for (place, &index) in lights.order.iter().enumerate().skip(lights.in_surface_pass) {
         let light = &scene.lights[index];

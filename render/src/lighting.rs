@@ -53,10 +53,11 @@ impl Lighting {
         scene: &Scene,
         (light_count, lights): (usize, &[uniforms::Light]),
         maps: &Maps,
-        draws: &Draws,
+        draws: &mut Draws,
         lists: &ProjectionLists,
     ) {
-        if self.instances.write(device, queue, bytemuck::cast_slice(&draws.instances)) {
+        let (instances, unsent) = draws.send();
+        if self.instances.write_parts(device, queue, instances, &unsent) {
             self.instances_group = None;
         }
         let frame = frame_of(scene, light_count, lists.receive_words);

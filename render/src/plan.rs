@@ -1,7 +1,6 @@
 //! What is drawn for each view, decided before anything is recorded.
 
-use crate::cull::Planes;
-use crate::draws::{Alpha, Draw, Draws};
+use crate::draws::{Draw, Draws, Found};
 use crate::lights::{Lights, falls_on};
 use crate::sheets::Sheets;
 use crate::slots::Slots;
@@ -12,6 +11,7 @@ use crate::volumes::Sight;
 use crate::{jobs, uniforms};
 use glam::{Mat4, Vec3};
 use std::collections::HashMap;
+use std::sync::Arc;
 use umbriel_scene::{Layout, Picture, PictureKind, Rect, Samples, Scene, View};
 
 /// One view of one picture.
@@ -29,11 +29,11 @@ pub(crate) struct ViewPlan {
     pub(crate) base_slot: usize,
     /// Where shapes are shaded once, after depth and the first light's volumes: the view with that light among the others.
     pub(crate) lit_slot: Option<usize>,
-    pub(crate) opaque: Vec<Draw>,
+    pub(crate) opaque: Arc<[Draw]>,
     /// Shapes with lines over their edges.
     pub(crate) contoured: Vec<(usize, Draw)>,
     pub(crate) blend_slot: usize,
-    pub(crate) blended: Vec<Draw>,
+    pub(crate) blended: Arc<[Draw]>,
     /// What shadow volumes are chosen by.
     pub(crate) sight: Sight,
     /// Those of the opaque shapes whose own shader makes something of a light's shadow.
@@ -48,7 +48,7 @@ pub(crate) struct Step {
     /// By a shadow texture, not by the stencil alone: the jobs of its layers.
     pub(crate) soft: Option<Vec<usize>>,
     /// Those of the opaque shapes on which its light's shadow does not fall.
-    pub(crate) exempt: Vec<Draw>,
+    pub(crate) exempt: Arc<[Draw]>,
     pub(crate) then: Then,
 }
 
@@ -152,8 +152,6 @@ pub(crate) fn plan_picture(
     limit: u32,
 ) -> Vec<ViewPlan> {
     let mut plans = Vec::new();
-    let mut unseen: Vec<usize> = frame.scene.stand_ins.iter().map(|s| s.place).collect();
-    unseen.sort_unstable();
     for (index, view) in picture.views.iter().enumerate() {
         let Some((rect, layer, channels)) = place_of(picture, index) else {
             problems.report(format!("picture '{}': view '{}' has no place inside of it", picture.name, view.name));
@@ -165,20 +163,19 @@ pub(crate) fn plan_picture(
         }
         let shown = shown_light(picture, frame, problems);
         let clip_from_world = view.frustum.clip_from_view() * view.view_from_world;
-        let planes = Planes::new(&clip_from_world);
-        let is_seen = |i: u32| unseen.binary_search(&(i as usize)).is_err();
-        let (opaque, outside) = draws.cull(&planes, |alpha, _, i| alpha != Alpha::Blend && is_seen(i));
+        let found = draws.surfaces(&clip_from_world);
+        let (opaque, outside) = (found.draws, found.culled);
         let is_visibility = picture.kind != PictureKind::Colour;
-        let (blended, blended_outside) =
-            if is_visibility { (Vec::new(), 0) } else { draws.back_to_front(&planes, &view.view_from_world) };
+        let found = if is_visibility { Found::default() } else { draws.back_to_front(&clip_from_world, &view.view_from_world) };
+        let (blended, blended_outside) = (found.draws, found.culled);
         let contoured = if is_visibility || frame.contours.is_empty() {
             Vec::new()
         } else {
-            draws.single(&planes, |index| frame.contours.binary_search(&index).is_ok() && is_seen(index as u32))
+            draws.single(&clip_from_world, |index| frame.contours.binary_search(&index).is_ok())
         };
         stats.culled += (outside + blended_outside) as u32;
         stats.views += 1;
-        let mut exempt_from = Exempt { scene: frame.scene, planes: &planes, is_seen: &is_seen, known: HashMap::new() };
+        let mut exempt_from = Exempt { scene: frame.scene, clip_from_world: &clip_from_world, known: HashMap::new() };
         // Soft shadows read their view's pixels by their place.
         let origin = sheets.place(view.size, frame.soft.iter().any(Option::is_some), limit);
         let mut uniform = uniform_of(view, rect, frame.scene);
@@ -207,11 +204,11 @@ pub(crate) fn plan_picture(
             let soft = frame.soft[job].as_ref().map(|s| s.layers.clone());
             steps.push(Step { job, soft, exempt: exempt_from.light(draws, purpose.light(frame.lights)), then });
         }
-        let seen = opaque.iter().flat_map(|d| draws.visible_of(d)).map(|i| *i as usize);
+        // Without volumes nobody asks what they may fall on.
+        let volumes_matter = !steps.is_empty();
+        let seen = opaque.iter().filter(|_| volumes_matter).flat_map(|d| draws.visible.of(d)).map(|i| *i as usize);
         let mut sight = Sight::new(view, jobs::receivers(seen.clone(), frame.scene)).at(origin);
-        if !steps.is_empty()
-            && let Some(surfaces) = jobs::seen(seen, frame.scene, &view.view_from_world)
-        {
+        if volumes_matter && let Some(surfaces) = jobs::seen(seen, frame.scene, &view.view_from_world) {
             sight = sight.with(surfaces);
         }
         let in_base = match shown {
@@ -247,17 +244,15 @@ pub(crate) fn plan_picture(
 /// Shapes on which a light's shadow does not fall. Lights that no shape lists share one answer.
 struct Exempt<'a> {
     scene: &'a Scene,
-    planes: &'a Planes,
-    is_seen: &'a dyn Fn(u32) -> bool,
-    known: HashMap<Option<usize>, Vec<Draw>>,
+    clip_from_world: &'a Mat4,
+    known: HashMap<Option<usize>, Arc<[Draw]>>,
 }
 
 impl Exempt<'_> {
-    fn light(&mut self, draws: &mut Draws, light: usize) -> Vec<Draw> {
+    fn light(&mut self, draws: &mut Draws, light: usize) -> Arc<[Draw]> {
         let key = (!self.scene.receive_lists.is_empty()).then_some(light);
-        let (scene, planes, is_seen) = (self.scene, self.planes, self.is_seen);
-        let find =
-            || draws.cull(planes, |alpha, _, i| alpha != Alpha::Blend && is_seen(i) && !falls_on(scene, light, i as usize)).0;
+        let (scene, clip_from_world) = (self.scene, self.clip_from_world);
+        let find = || draws.surfaces_where(clip_from_world, |i| !falls_on(scene, light, i)).draws;
         self.known.entry(key).or_insert_with(find).clone()
     }
 }

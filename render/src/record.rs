@@ -28,6 +28,14 @@ pub(crate) struct Drawer<'a> {
     pub(crate) instances: Option<&'a wgpu::BindGroup>,
 }
 
+/// What a pipeline reads of meshes and materials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reads {
+    /// Places of vertices alone.
+    Positions,
+    All,
+}
+
 impl Drawer<'_> {
     /// Draws a list; `choose` sets the pipeline of a kind.
     pub(crate) fn draw(
@@ -35,12 +43,13 @@ impl Drawer<'_> {
         pass: &mut wgpu::RenderPass<'_>,
         draws: &[Draw],
         stats: &mut FrameStats,
-        mut choose: impl FnMut(&mut wgpu::RenderPass<'_>, Kind),
+        mut choose: impl FnMut(&mut wgpu::RenderPass<'_>, Kind) -> Reads,
     ) {
         if draws.is_empty() {
             return;
         }
         let (mut kind, mut material, mut mesh) = (None, None, None);
+        let mut reads = Reads::All;
         pass.set_bind_group(1, self.instances, &[]);
         pass.set_vertex_buffer(3, self.visible.slice(..));
         for draw in draws {
@@ -50,16 +59,21 @@ impl Drawer<'_> {
                 continue;
             };
             if kind.replace(batch.kind) != Some(batch.kind) {
-                choose(pass, batch.kind);
+                let before = std::mem::replace(&mut reads, choose(pass, batch.kind));
+                if before != reads {
+                    (material, mesh) = (None, None);
+                }
             }
-            if material.replace(batch.material) != Some(batch.material) {
+            if reads == Reads::All && material.replace(batch.material) != Some(batch.material) {
                 pass.set_bind_group(2, &gpu_material.group, &[]);
             }
             if mesh.replace((batch.mesh, batch.deformed)) != Some((batch.mesh, batch.deformed)) {
                 let deformed = batch.deformed.and_then(|d| self.deformer.get(d));
                 pass.set_vertex_buffer(0, deformed.map_or(&gpu_mesh.positions, |d| &d.positions).slice(..));
-                pass.set_vertex_buffer(1, deformed.map_or(&gpu_mesh.frames, |d| &d.frames).slice(..));
-                pass.set_vertex_buffer(2, gpu_mesh.attributes.slice(..));
+                if reads == Reads::All {
+                    pass.set_vertex_buffer(1, deformed.map_or(&gpu_mesh.frames, |d| &d.frames).slice(..));
+                    pass.set_vertex_buffer(2, gpu_mesh.attributes.slice(..));
+                }
                 pass.set_index_buffer(gpu_mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
             }
             pass.draw_indexed(0..gpu_mesh.index_count, 0, draw.first..draw.first + draw.count);
@@ -258,6 +272,7 @@ impl Recorder<'_> {
             if let Some(pipeline) = self.surface.get(kind_of_pass, kind) {
                 pass.set_pipeline(pipeline);
             }
+            Reads::All
         });
     }
 

@@ -4,7 +4,7 @@ use crate::cache::{GpuMaterial, GpuMesh, MaterialCache, Slab, make_mesh};
 use crate::clock::Clock;
 use crate::contours::Contours;
 use crate::deform::Deformer;
-use crate::draws::{Caches, Casting, Draw, Draws};
+use crate::draws::{Caches, Draw, Draws};
 use crate::layouts::Layouts;
 use crate::lighting::Lighting;
 use crate::lights::{self, Lights, draws_map};
@@ -24,7 +24,10 @@ use crate::volumes::{Depth, VolumeJob, VolumePass};
 use crate::{Error, Gpu, buffer::GrowBuffer, gpu, jobs, surroundings, uniforms};
 use glam::Vec3;
 use std::time::Instant;
-use umbriel_scene::{Aabb, Material, Mesh, Picture, Samples, Scene, origin_near_eyes};
+use umbriel_scene::{Aabb, Drawables, Material, Mesh, Picture, Samples, Scene, origin_near_eyes};
+
+/// Frames from one look for what is not used any more to the next.
+const FRAMES_BETWEEN_SWEEPS: u64 = 16;
 
 /// Draws frames.
 pub struct Renderer {
@@ -41,6 +44,7 @@ pub struct Renderer {
     materials: Slab<Material, GpuMaterial>,
     material_cache: MaterialCache,
     draws: Draws,
+    surroundings: surroundings::Kept,
     lighting: Lighting,
     views: Slots<uniforms::View>,
     films: Slots<uniforms::Film>,
@@ -75,6 +79,7 @@ impl Renderer {
             materials: Slab::default(),
             material_cache: MaterialCache::new(device, &gpu.queue).map_err(Error::Device)?,
             draws: Draws::default(),
+            surroundings: surroundings::Kept::default(),
             lighting: Lighting::new(device),
             views: Slots::new(device, "views"),
             films: Slots::new(device, "films"),
@@ -143,6 +148,7 @@ impl Renderer {
             contours: &contours,
         };
         let (plans, sheets) = self.plan_views(pictures, &frame, &mut stats);
+        self.maps.prepare(&self.gpu.device, &mut self.views, &mut self.draws);
         let lists = projection::lists(scene, pictures, &lights, &self.maps, casters);
         self.upload(scene, (lights.order.len(), &light_uniforms), &lists);
         let prepared = Instant::now();
@@ -175,8 +181,12 @@ impl Renderer {
     /// Meshes, materials and places of everything that is drawn.
     fn take_drawables(&mut self, scene: &Scene) {
         let (device, queue, frame) = (&self.gpu.device, &self.gpu.queue, self.frame);
-        self.draws.begin(scene.drawables.len());
-        for (index, d) in scene.drawables.iter().enumerate() {
+        let pages = self.draws.begin(&scene.drawables, &scene.stand_ins);
+        for index in pages.into_iter().flat_map(|page| Drawables::places(page, scene.drawables.len())) {
+            let d = &scene.drawables[index];
+            if self.draws.set_again(index, d) {
+                continue;
+            }
             if !d.visible {
                 self.draws.hide(index);
                 continue;
@@ -212,23 +222,26 @@ impl Renderer {
             let caches = Caches { meshes: &self.meshes, materials: &self.materials };
             self.draws.set(index, d, (mesh, material), deformed, &caches);
         }
-        self.draws.sort();
+        self.draws.finish();
     }
 
     /// Shadow maps, fitted to all views at once. Gives a box around all casters.
     fn choose_maps(&mut self, scene: &Scene, pictures: &[Picture]) -> Aabb {
-        let around = surroundings::of(scene, pictures, &self.draws);
+        let casters = self.draws.casters_box();
+        let any_has_holes = self.draws.any_has_holes();
+        if !(0..scene.lights.len()).any(|light| draws_map(scene, light, any_has_holes)) {
+            self.maps.forget();
+            return casters;
+        }
+        let around = self.surroundings.of(pictures, &self.draws);
         let problems = &mut self.problems;
         let revision = |d| self.deformer.get(d).map_or(0, |d| d.revision);
-        let any_has_holes = self.draws.drawn().any(|(_, casting)| casting == Casting::Holed);
-        let has_maps = (0..scene.lights.len()).any(|light| draws_map(scene, light, any_has_holes));
-        let casters = if has_maps { self.draws.casters(&scene.drawables, revision) } else { Vec::new() };
-        let is_new = self.maps.choose(&self.gpu.device, scene, &around, casters, |message| problems.report(message));
+        let snapshots = self.draws.snapshots(&scene.drawables, revision);
+        let is_new = self.maps.choose(&self.gpu.device, scene, around, &snapshots, |message| problems.report(message));
         if is_new {
             self.lighting.forget_maps();
         }
-        self.maps.prepare(&self.gpu.device, &mut self.views, &mut self.draws);
-        around.casters
+        casters
     }
 
     fn plan_views(&mut self, pictures: &[Picture], frame: &plan::Frame<'_>, stats: &mut FrameStats) -> (Vec<ViewPlan>, Sheets) {
@@ -249,24 +262,27 @@ impl Renderer {
         }
         for view in &mut plans {
             if !view.is_visibility && !view.steps.is_empty() {
-                let shader = |d: &&Draw| self.draws.batches[d.batch as usize].kind.shader;
+                let shader = |d: &&Draw| self.draws.batches()[d.batch as usize].kind.shader;
                 view.shading_shadow = view.opaque.iter().filter(|d| self.surface.shades_shadow(shader(d))).copied().collect();
             }
-            let mut passes = vec![(Pass::Blend, &view.blended)];
+            let mut passes: Vec<(Pass, &[Draw])> = vec![(Pass::Blend, &view.blended)];
             let shaded =
                 if view.lit_slot.is_some() { &[Pass::Depth, Pass::BaseLit, Pass::BaseInShadow][..] } else { &[view.base_pass()] };
-            passes.extend(shaded.iter().map(|pass| (*pass, &view.opaque)));
+            passes.extend(shaded.iter().map(|pass| (*pass, &*view.opaque)));
             if !view.steps.is_empty() {
                 passes.push((Pass::AddInShadow, &view.shading_shadow));
-                passes.extend(view.steps.iter().map(|step| (Pass::Exempt, &step.exempt)));
-                passes.extend(view.steps.iter().map(|s| (view.add_pass(s.soft.is_some()), &view.opaque)));
+                passes.extend(view.steps.iter().map(|step| (Pass::Exempt, &*step.exempt)));
+                passes.extend(view.steps.iter().map(|s| (view.add_pass(s.soft.is_some()), &*view.opaque)));
             }
             for (_, draw) in &view.contoured {
-                self.surface.make(device, Pass::Mark, self.draws.batches[draw.batch as usize].kind);
+                self.surface.make(device, Pass::Mark, self.draws.batches()[draw.batch as usize].kind);
             }
             for (pass, list) in passes {
-                for draw in list {
-                    self.surface.make(device, pass, self.draws.batches[draw.batch as usize].kind);
+                let mut last = None;
+                for kind in list.iter().map(|draw| self.draws.batches()[draw.batch as usize].kind) {
+                    if last.replace(kind) != Some(kind) {
+                        self.surface.make(device, pass, kind);
+                    }
                 }
             }
         }
@@ -283,8 +299,9 @@ impl Renderer {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         self.views.upload(device, queue, &self.layouts.view);
         self.films.upload(device, queue, &self.layouts.film);
-        self.visible.write(device, queue, bytemuck::cast_slice(&self.draws.visible));
-        self.lighting.upload(device, queue, &self.layouts, scene, lights, &self.maps, &self.draws, lists);
+        let (visible, unsent) = self.draws.visible.send();
+        self.visible.write_parts(device, queue, visible, &[unsent]);
+        self.lighting.upload(device, queue, &self.layouts, scene, lights, &self.maps, &mut self.draws, lists);
     }
 
     /// Records and submits: deformation, volumes, maps, views.
@@ -305,7 +322,7 @@ impl Renderer {
             meshes: &self.meshes,
             materials: &self.materials,
             deformer: &self.deformer,
-            batches: &self.draws.batches,
+            batches: self.draws.batches(),
             visible: &self.visible.buffer,
             instances: self.lighting.instances(),
         };
@@ -344,7 +361,19 @@ impl Renderer {
         stats.gpu_s = self.clock.collect(device);
     }
 
+    /// What the frame's batches use stays for a while, even if nothing looks at it because nothing changed.
     fn drop_unused(&mut self) {
+        if !self.frame.is_multiple_of(FRAMES_BETWEEN_SWEEPS) {
+            return;
+        }
+        for batch in self.draws.batches() {
+            self.meshes.touch(batch.mesh, self.frame);
+            self.materials.touch(batch.material, self.frame);
+            self.surface.touch(batch.kind.shader, self.frame);
+            if let Some(deformed) = batch.deformed {
+                self.deformer.touch(deformed, self.frame);
+            }
+        }
         self.meshes.drop_unused(self.frame);
         self.materials.drop_unused(self.frame);
         self.material_cache.drop_unused();

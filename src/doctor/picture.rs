@@ -64,7 +64,13 @@ fn scene(meshes: &[(Mesh, Mat4)], width: f32, world_from_camera: Mat4) -> Scene 
         }
     }
     let background = umbriel_scene::Background { zenith: Vec3::ONE, horizon: Vec3::ONE, nadir: Vec3::ONE };
-    Scene { drawables, lights: vec![light(world_from_camera)], ambient: Vec3::splat(0.35), background, ..Scene::default() }
+    Scene {
+        drawables: drawables.into(),
+        lights: vec![light(world_from_camera)],
+        ambient: Vec3::splat(0.35),
+        background,
+        ..Scene::default()
+    }
 }
 
 fn light(world_from_camera: Mat4) -> Light {

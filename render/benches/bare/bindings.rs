@@ -13,7 +13,7 @@ use wgpu::{BindGroup, BindGroupLayout, BindingResource, BindingType, BufferUsage
 /// Pictures of a material.
 const MATERIAL_TEXTURES: usize = 5 + Material::MOST_LAYERS;
 /// Floats of an instance.
-const INSTANCE: u32 = 32;
+pub(crate) const INSTANCE: usize = 32;
 
 /// Layouts of the bind groups.
 pub(crate) struct Layouts {
@@ -92,26 +92,42 @@ pub(crate) struct Batch {
 }
 
 /// Mesh and material, and where they stand.
-type Look = (Arc<Mesh>, Arc<Material>, Vec<Mat4>);
+type Look = (Arc<Mesh>, Arc<Material>, Vec<usize>);
 
-/// All instances as a group, the list of their numbers, and the batches.
-pub(crate) fn batches(gpu: &Gpu, layouts: &Layouts, scene: &Scene) -> (BindGroup, wgpu::Buffer, Vec<Batch>) {
+/// All instances, in the order in which they are drawn.
+pub(crate) struct Instances {
+    pub(crate) group: BindGroup,
+    pub(crate) buffer: wgpu::Buffer,
+    /// Their numbers.
+    pub(crate) visible: wgpu::Buffer,
+    /// What the buffer holds.
+    pub(crate) numbers: Vec<[f32; INSTANCE]>,
+    /// Place of each drawable.
+    pub(crate) places: Vec<usize>,
+}
+
+/// All instances, and the batches.
+pub(crate) fn batches(gpu: &Gpu, layouts: &Layouts, scene: &Scene) -> (Instances, Vec<Batch>) {
     let device = &gpu.device;
     let mut looks: Vec<Look> = Vec::new();
-    for d in &scene.drawables {
+    for (index, d) in scene.drawables.iter().enumerate() {
         let is_alike = |look: &&mut Look| Arc::ptr_eq(&look.0, &d.mesh) && Arc::ptr_eq(&look.1, &d.material);
         match looks.iter_mut().find(is_alike) {
-            Some(look) => look.2.push(d.world_from_object),
-            None => looks.push((d.mesh.clone(), d.material.clone(), vec![d.world_from_object])),
+            Some(look) => look.2.push(index),
+            None => looks.push((d.mesh.clone(), d.material.clone(), vec![index])),
         }
     }
     let white = white(gpu);
     let sampler = device.create_sampler(&Default::default());
-    let mut instances: Vec<f32> = Vec::new();
+    let mut instances: Vec<[f32; INSTANCE]> = Vec::new();
+    let mut places = vec![0; scene.drawables.len()];
     let mut batches = Vec::new();
-    for (mesh, material, places) in looks {
-        let first = instances.len() as u32 / INSTANCE;
-        places.iter().for_each(|place| instances.extend(instance(place)));
+    for (mesh, material, members) in looks {
+        let first = instances.len() as u32;
+        for index in members {
+            places[index] = instances.len();
+            instances.push(instance(&scene.drawables[index].world_from_object));
+        }
         let frames: Vec<[f32; 7]> = mesh.normals.iter().map(|n| [n.x, n.y, n.z, 0.0, 0.0, 0.0, 0.0]).collect();
         let attributes = vec![[0.0f32, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]; mesh.positions.len()];
         let uniform = init(device, &material_numbers(&material), BufferUsages::UNIFORM);
@@ -128,13 +144,14 @@ pub(crate) fn batches(gpu: &Gpu, layouts: &Layouts, scene: &Scene) -> (BindGroup
             indices: init_bytes(device, bytemuck::cast_slice(&mesh.indices), BufferUsages::INDEX),
             index_count: mesh.indices.len() as u32,
             material: group(device, &layouts.material, &resources),
-            instances: first..instances.len() as u32 / INSTANCE,
+            instances: first..instances.len() as u32,
         });
     }
-    let numbers: Vec<u32> = (0..instances.len() as u32 / INSTANCE).collect();
+    let numbers: Vec<u32> = (0..instances.len() as u32).collect();
     let visible = init_bytes(device, bytemuck::cast_slice(&numbers), BufferUsages::VERTEX);
-    let instances = init(device, &instances, BufferUsages::STORAGE);
-    (group(device, &layouts.instances, &[instances.as_entire_binding()]), visible, batches)
+    let buffer = init(device, instances.as_flattened(), BufferUsages::STORAGE | BufferUsages::COPY_DST);
+    let group = group(device, &layouts.instances, &[buffer.as_entire_binding()]);
+    (Instances { group, buffer, visible, numbers: instances, places }, batches)
 }
 
 fn white(gpu: &Gpu) -> wgpu::TextureView {
@@ -152,11 +169,16 @@ fn white(gpu: &Gpu) -> wgpu::TextureView {
     gpu.device.create_texture_with_data(&gpu.queue, &descriptor, order, &[255; 4]).create_view(&Default::default())
 }
 
-fn instance(world_from_object: &Mat4) -> Vec<f32> {
-    let normal = Mat3::from_mat4(*world_from_object).inverse().transpose();
-    let mut numbers = world_from_object.to_cols_array().to_vec();
-    [normal.x_axis, normal.y_axis, normal.z_axis].iter().for_each(|c| numbers.extend([c.x, c.y, c.z, 0.0]));
-    numbers.extend([f32::from_bits(1), 0.0, 0.0, 0.0]);
+/// What the shaders read of an instance.
+pub(crate) fn instance(world_from_object: &Mat4) -> [f32; INSTANCE] {
+    let linear = Mat3::from_mat4(*world_from_object);
+    let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
+    let mut numbers = [0.0; INSTANCE];
+    numbers[..16].copy_from_slice(&world_from_object.to_cols_array());
+    for (column, normal) in [y.cross(z), z.cross(x), x.cross(y)].iter().enumerate() {
+        numbers[16 + 4 * column..][..3].copy_from_slice(&normal.to_array());
+    }
+    numbers[28] = f32::from_bits(1);
     numbers
 }
 
@@ -170,33 +192,25 @@ fn material_numbers(material: &Material) -> Vec<f32> {
     numbers
 }
 
-/// The view whose place in the sheet starts at `left`.
-pub(crate) fn view(
-    device: &Device,
-    layouts: &Layouts,
-    (view, left): (&View, u32),
-    light: &Light,
-    map: Option<&LightMap>,
-) -> BindGroup {
+/// What the shaders read of a view whose place in the sheet starts at `left`, with the numbers of its light.
+pub(crate) fn view_numbers(view: &View, left: u32, light: &[f32]) -> Vec<f32> {
     let clip_from_world = view.frustum.clip_from_view() * view.view_from_world;
     let eye = view.view_from_world.inverse().w_axis;
-    let light = light_numbers(light, map);
-    view_group(device, layouts, [clip_from_world, view.view_from_world], eye, (left, view.size), &light)
+    numbers_of([clip_from_world, view.view_from_world], eye, (left, view.size), light)
 }
 
 /// The light's map as a view.
 pub(crate) fn map_view(device: &Device, layouts: &Layouts, map: &LightMap) -> BindGroup {
-    view_group(device, layouts, [map.map_from_world; 2], map.towards_light.extend(0.0), (0, [map.size; 2]), &[0.0; 32])
+    let numbers = numbers_of([map.map_from_world; 2], map.towards_light.extend(0.0), (0, [map.size; 2]), &[0.0; 32]);
+    view_group(device, layouts, &numbers).1
 }
 
-fn view_group(
-    device: &Device,
-    layouts: &Layouts,
+fn numbers_of(
     [clip_from_world, view_from_world]: [Mat4; 2],
     eye: Vec4,
     (left, size): (u32, [u32; 2]),
     light: &[f32],
-) -> BindGroup {
+) -> Vec<f32> {
     let mut numbers: Vec<f32> = Vec::new();
     for m in [clip_from_world, clip_from_world.inverse(), view_from_world] {
         numbers.extend(m.to_cols_array());
@@ -210,8 +224,14 @@ fn view_group(
     // That light, and no second one.
     numbers.extend(light);
     numbers.extend([0.0; 32]);
-    let buffer = init(device, &numbers, BufferUsages::UNIFORM);
-    group(device, &layouts.view, &[buffer.as_entire_binding()])
+    numbers
+}
+
+/// Buffer and group of a view.
+pub(crate) fn view_group(device: &Device, layouts: &Layouts, numbers: &[f32]) -> (wgpu::Buffer, BindGroup) {
+    let buffer = init(device, numbers, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+    let group = group(device, &layouts.view, &[buffer.as_entire_binding()]);
+    (buffer, group)
 }
 
 /// Two layers, of which the first is the map.
@@ -279,7 +299,7 @@ pub(crate) fn lighting(
 }
 
 /// A directional light as the shaders read it.
-fn light_numbers(light: &Light, map: Option<&LightMap>) -> Vec<f32> {
+pub(crate) fn light_numbers(light: &Light, map: Option<&LightMap>) -> Vec<f32> {
     let Light { direction: d, color, intensity, .. } = light;
     let c = *color * *intensity;
     let count = f32::from_bits(u32::from(map.is_some()));

@@ -2,7 +2,7 @@
 //!
 //! Its views lie side by side in one target, as small views do in the renderer.
 
-use crate::bindings::{self, Batch, Layouts, LightMap};
+use crate::bindings::{self, Batch, Instances, Layouts, LightMap};
 use crate::pipelines;
 use umbriel_render::Gpu;
 use umbriel_scene::{Scene, View};
@@ -22,6 +22,7 @@ struct ShadowPass {
 
 /// One view, its place in the sheet, and the picture that it ends in.
 struct Eye {
+    buffer: wgpu::Buffer,
     group: wgpu::BindGroup,
     left: u32,
     size: [u32; 2],
@@ -35,10 +36,11 @@ pub(crate) struct Program {
     background: wgpu::RenderPipeline,
     compose: wgpu::RenderPipeline,
     eyes: Vec<Eye>,
-    instances: wgpu::BindGroup,
+    /// Numbers of the one light, which lie in every view.
+    light: Vec<f32>,
+    instances: Instances,
     lighting: wgpu::BindGroup,
     sheet: wgpu::BindGroup,
-    visible: wgpu::Buffer,
     batches: Vec<Batch>,
     samples: wgpu::TextureView,
     resolved: wgpu::TextureView,
@@ -57,15 +59,17 @@ impl Program {
         let target = |format| texture(device, sheet_size, format, 4, TextureUsages::empty()).create_view(&Default::default());
         let map = LightMap::new(&scene.lights[0]);
         let maps = bindings::maps_texture(device, map.as_ref());
-        let (instances, visible, batches) = bindings::batches(gpu, &layouts, scene);
+        let (instances, batches) = bindings::batches(gpu, &layouts, scene);
+        let light = bindings::light_numbers(&scene.lights[0], map.as_ref());
         let eyes = (0..).zip(views).map(|(number, view)| {
             let left = number * size[0];
             let picture = texture(device, size, PICTURE, 1, TextureUsages::COPY_SRC);
-            let group = bindings::view(device, &layouts, (view, left), &scene.lights[0], map.as_ref());
-            Eye { group, left, size, target: picture.create_view(&Default::default()), picture }
+            let (buffer, group) = bindings::view_group(device, &layouts, &bindings::view_numbers(view, left, &light));
+            Eye { buffer, group, left, size, target: picture.create_view(&Default::default()), picture }
         });
         Program {
             eyes: eyes.collect(),
+            light,
             shadows: map.as_ref().map(|map| ShadowPass {
                 pipeline: pipelines::maps(device, &layouts),
                 view: bindings::map_view(device, &layouts, map),
@@ -77,11 +81,28 @@ impl Program {
             lighting: bindings::lighting(device, &layouts, scene, map.as_ref(), &maps),
             instances,
             sheet: bindings::group(device, &layouts.picture, &[wgpu::BindingResource::TextureView(&resolved)]),
-            visible,
             batches,
             samples: target(LINEAR),
             depth: target(DEPTH),
             resolved,
+        }
+    }
+
+    /// Sends views that take the place of those before.
+    pub(crate) fn look(&self, gpu: &Gpu, views: &[View]) {
+        for (eye, view) in self.eyes.iter().zip(views) {
+            gpu.queue.write_buffer(&eye.buffer, 0, bytemuck::cast_slice(&bindings::view_numbers(view, eye.left, &self.light)));
+        }
+    }
+
+    /// Sends all places where some drawables moved.
+    pub(crate) fn place(&mut self, gpu: &Gpu, scene: &Scene, moved: &[usize]) {
+        let Instances { buffer, places, numbers, .. } = &mut self.instances;
+        for &index in moved {
+            numbers[places[index]] = bindings::instance(&scene.drawables[index].world_from_object);
+        }
+        if !moved.is_empty() {
+            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(numbers.as_flattened()));
         }
     }
 
@@ -139,8 +160,8 @@ impl Program {
     }
 
     fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
-        pass.set_bind_group(1, &self.instances, &[]);
-        pass.set_vertex_buffer(3, self.visible.slice(..));
+        pass.set_bind_group(1, &self.instances.group, &[]);
+        pass.set_vertex_buffer(3, self.instances.visible.slice(..));
         for batch in &self.batches {
             for (slot, buffer) in (0..).zip(&batch.buffers) {
                 pass.set_vertex_buffer(slot, buffer.slice(..));

@@ -6,11 +6,16 @@ use umbriel_scene::{Aabb, Drawable, Frustum, Light, MapSettings, Material, Mesh,
 
 /// `objects` balls of `kinds` meshes and materials, all in sight of [`view`].
 pub(crate) fn grid(objects: usize, kinds: usize) -> Scene {
+    grid_of(objects, kinds, |kind| 5 + kind % 3)
+}
+
+/// The same, with the number of rings of the balls of each kind.
+pub(crate) fn grid_of(objects: usize, kinds: usize, rings: impl Fn(u32) -> u32) -> Scene {
     let looks: Vec<(Arc<Mesh>, Arc<Material>)> = (0..kinds)
         .map(|i| {
             let hue = i as f32 / kinds as f32;
             let base_color = Vec4::new(0.3 + 0.7 * hue, 0.9 - 0.6 * hue, 0.5, 1.0);
-            (Arc::new(ball(5 + i as u32 % 3)), Arc::new(Material { base_color, ..Default::default() }))
+            (Arc::new(ball(rings(i as u32))), Arc::new(Material { base_color, ..Default::default() }))
         })
         .collect();
     let side = (objects as f32).sqrt().ceil() as usize;

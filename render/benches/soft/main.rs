@@ -51,7 +51,7 @@ fn light(soft: bool) -> Light {
 /// Median milliseconds of a frame, hard and soft. The caster turns, so that its volume is made anew each time.
 fn time(gpu: &Gpu, caster: Mesh, picture: &Picture) -> (f64, f64) {
     let bounds = caster.bounds;
-    let mut scene = Scene { drawables: vec![floor(), drawable(caster, 0.6)], ..Default::default() };
+    let mut scene = Scene { drawables: vec![floor(), drawable(caster, 0.6)].into(), ..Default::default() };
     let mut renderers = [false, true].map(|soft| (soft, Renderer::new(gpu).expect("the renderer works"), Vec::new()));
     for frame in 0..FRAMES + 3 {
         let turn = Mat4::from_rotation_y(0.05 * frame as f32);

@@ -39,6 +39,12 @@ pub(crate) const VERTEX_BUFFERS: [Option<VertexBufferLayout<'static>>; 4] = [
     layout(4, VertexStepMode::Instance, &[attribute(6, 0, VertexFormat::Uint32)]),
 ];
 
+/// Of the same buffers what places triangles: the others need not be bound.
+pub(crate) const POSITION_BUFFERS: [Option<VertexBufferLayout<'static>>; 4] = {
+    let [positions, _, _, instances] = VERTEX_BUFFERS;
+    [positions, None, None, instances]
+};
+
 const fn layout(
     stride: u64,
     step_mode: VertexStepMode,

@@ -6,5 +6,5 @@ mod slab;
 mod texture;
 
 pub(crate) use material::{GpuMaterial, MaterialCache};
-pub(crate) use mesh::{GpuMesh, VERTEX_BUFFERS, make_mesh};
+pub(crate) use mesh::{GpuMesh, POSITION_BUFFERS, VERTEX_BUFFERS, make_mesh};
 pub(crate) use slab::{KEEP_FRAMES, Slab};

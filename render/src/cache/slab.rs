@@ -57,6 +57,13 @@ impl<K, V> Slab<K, V> {
         self.entries.get(id as usize)?.as_ref().map(|e| &e.value)
     }
 
+    /// An entry is in use.
+    pub(crate) fn touch(&mut self, id: u32, frame: u64) {
+        if let Some(Some(entry)) = self.entries.get_mut(id as usize) {
+            entry.last_used = frame;
+        }
+    }
+
     pub(crate) fn key(&self, id: u32) -> Option<&Arc<K>> {
         self.entries.get(id as usize)?.as_ref().map(|e| &e.key)
     }

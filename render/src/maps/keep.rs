@@ -5,7 +5,7 @@
 use super::atlas::Place;
 use super::fit::{Fit, Projection, map_frame};
 use crate::cull::{CentredBox, Planes};
-use crate::draws::Caster;
+use crate::draws::{Caster, Snapshot};
 use glam::{Mat4, Vec3};
 use std::sync::Arc;
 use umbriel_scene::{Aabb, Light, MapSettings};
@@ -15,14 +15,6 @@ use umbriel_scene::{Aabb, Light, MapSettings};
 const TOLERANCE: f32 = 3e-5;
 /// Casters whose motion is tried for all of them.
 const GUESSES: usize = 4;
-
-/// What cast at the time a map was drawn.
-pub(crate) struct Snapshot {
-    /// In the order of their places.
-    pub(crate) casters: Vec<Caster>,
-    /// Half the diagonal of the box around them, metres.
-    pub(crate) radius: f32,
-}
 
 /// How casters moved since a snapshot.
 pub(crate) struct Motion {
@@ -47,29 +39,34 @@ pub(crate) struct Held {
     pub(crate) is_empty: bool,
 }
 
-/// How the casters moved from one snapshot to another.
+/// How the casters moved from one snapshot to another. Pages that both share are at rest and need not be looked at.
 pub(crate) fn motion(old: &Snapshot, new: &Snapshot) -> Motion {
-    let pairs = pairs(&old.casters, &new.casters);
-    let together: Vec<(&Caster, &Caster)> = pairs.iter().filter_map(|(a, b)| Some(((*a)?, (*b)?))).collect();
+    let page = |of: &Snapshot, number: usize| of.pages.get(number).cloned().unwrap_or_else(|| [].into());
+    let pages: Vec<_> = (0..old.pages.len().max(new.pages.len())).map(|i| (page(old, i), page(new, i))).collect();
+    let is_shared = |(a, b): &&(Arc<[Caster]>, Arc<[Caster]>)| Arc::ptr_eq(a, b);
+    let at_rest: usize = pages.iter().filter(is_shared).map(|(page, _)| page.len()).sum();
+    let changed = || pages.iter().filter(|pair| !is_shared(pair)).flat_map(|(a, b)| pairs(a, b));
+    let together: Vec<(&Caster, &Caster)> = changed().filter_map(|(a, b)| a.zip(b)).collect();
     let tolerance = TOLERANCE * new.radius;
     // One that looks otherwise now says as much of how all moved.
     let strays_of = |m: &Mat4| together.iter().filter(|(a, b)| !is_carried(m, a, b, tolerance)).count();
     let mut best = (strays_of(&Mat4::IDENTITY), Mat4::IDENTITY);
     for guess in 0..GUESSES.min(together.len()) {
-        if best.0 == 0 {
+        if best.0 <= at_rest {
             break;
         }
         let (a, b) = together[guess * together.len() / GUESSES.min(together.len())];
         let m = b.world_from_object * a.world_from_object.inverse();
         if a.world_from_object != b.world_from_object && is_stiff(&m) {
-            let strays = strays_of(&m);
+            let strays = strays_of(&m) + at_rest;
             best = if strays < best.0 { (strays, m) } else { best };
         }
     }
     let new_from_old = best.1;
+    let is_at_rest = new_from_old == Mat4::IDENTITY;
     let mut strays = Vec::new();
-    let mut is_exact = new_from_old == Mat4::IDENTITY;
-    for (a, b) in pairs {
+    let mut is_exact = is_at_rest;
+    for (a, b) in pages.iter().filter(|pair| !is_at_rest || !is_shared(pair)).flat_map(|(a, b)| pairs(a, b)) {
         if let (Some(a), Some(b)) = (a, b)
             && a.content == b.content
             && is_carried(&new_from_old, a, b, tolerance)
@@ -191,7 +188,8 @@ mod tests {
             reach: 1.0,
             bounds_in_world: unit.transformed(m),
         };
-        Snapshot { casters: places.iter().enumerate().map(caster).collect(), radius: 10.0 }
+        let casters: Vec<Caster> = places.iter().enumerate().map(caster).collect();
+        Snapshot { pages: casters.chunks(2).map(Arc::from).collect(), radius: 10.0 }
     }
 
     #[test]
@@ -222,6 +220,17 @@ mod tests {
         }
         let m = motion(&old, &each(&|_, m| turn * m)).new_from_old;
         assert!((m.transform_point3(Vec3::ONE) - turn.transform_point3(Vec3::ONE)).length() < 1e-4);
+        // Half of them lie in a page that both snapshots share, so it is known to be at rest.
+        let mut half_at_rest = each(&|i, m| if i < 2 { m } else { turn * m });
+        half_at_rest.pages[0] = old.pages[0].clone();
+        let found = motion(&old, &half_at_rest);
+        assert_eq!((found.new_from_old, found.strays.len(), found.is_exact), (Mat4::IDENTITY, 4, true));
+        let mut more_moved = each(&|i, m| if i < 1 { m } else { turn * m });
+        more_moved.pages[0] = vec![old.pages[0][0].clone()].into();
+        let (mut shares, gone) = (snapshot(&places), more_moved.pages[0].clone());
+        shares.pages[0] = gone;
+        let found = motion(&shares, &more_moved);
+        assert_eq!((found.strays.len(), found.is_exact), (2, false), "one at rest strays from two that moved");
         let back = motion(&snapshot(&places[..2]), &old);
         assert_eq!(back.strays.len(), 2, "casters that came");
     }

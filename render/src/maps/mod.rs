@@ -9,18 +9,19 @@ mod pipeline;
 mod share;
 
 use crate::clock::Clock;
-use crate::draws::{Caster, Casting, Draw, Draws, Kind};
+use crate::draws::{Draw, Draws, Kind, Snapshot};
 use crate::layouts::Layouts;
 use crate::lights::{draws_map, maps_holes_only};
+use crate::record::Reads;
+use crate::shaders;
 use crate::slots::Slots;
 use crate::stats::MapShare;
 use crate::uniforms;
-use crate::{cull::Planes, shaders};
 pub(crate) use cascades::Eye;
 pub(crate) use fit::projector;
 use fit::{Fit, Projection};
 use glam::Mat4;
-use keep::{Held, Motion, Snapshot};
+use keep::{Held, Motion};
 use share::Demand;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -35,7 +36,7 @@ pub(crate) struct Face {
     size: u32,
     place: atlas::Place,
     slot: usize,
-    draws: Vec<Draw>,
+    draws: Arc<[Draw]>,
     /// Has to be drawn in this frame.
     is_stale: bool,
     holes_only: bool,
@@ -59,7 +60,7 @@ pub(crate) struct Maps {
     layers: Vec<wgpu::TextureView>,
     pub(crate) sampler: wgpu::Sampler,
     module: wgpu::ShaderModule,
-    layout: wgpu::PipelineLayout,
+    layouts: [wgpu::PipelineLayout; 2],
     pipelines: HashMap<(u8, bool), wgpu::RenderPipeline>,
     empty: wgpu::RenderPipeline,
 }
@@ -75,6 +76,7 @@ struct Wanted {
 }
 
 /// What maps are fitted to.
+#[derive(Default)]
 pub(crate) struct Surroundings {
     pub(crate) eyes: Vec<Eye>,
     /// Box around what receives and some view sees.
@@ -86,11 +88,7 @@ pub(crate) struct Surroundings {
 impl Maps {
     pub(crate) fn new(device: &wgpu::Device, layouts: &Layouts) -> Maps {
         let module = shaders::module(device, "maps", shaders::MAPS);
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("maps"),
-            bind_group_layouts: &[Some(&layouts.view), Some(&layouts.instances), Some(&layouts.material)],
-            immediate_size: 0,
-        });
+        let layouts = pipeline::layouts(device, layouts);
         let (texture, whole, layers) = make_texture(device, 1, 1);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor { label: Some("maps"), ..Default::default() });
         let empty = pipeline::emptying(device, &module);
@@ -105,26 +103,34 @@ impl Maps {
             layers,
             sampler,
             module,
-            layout,
+            layouts,
             pipelines: HashMap::new(),
             empty,
         }
     }
 
-    /// Chooses the maps of the frame. True where the texture is a new one, which bind groups must learn.
+    /// No light has maps.
+    pub(crate) fn forget(&mut self) {
+        self.faces.clear();
+        self.shares.clear();
+        self.levels.clear();
+        self.held.clear();
+    }
+
+    /// Chooses the maps of the frame, for the lights that have some. True where the texture is a new one, which bind groups must learn.
     pub(crate) fn choose(
         &mut self,
         device: &wgpu::Device,
         scene: &Scene,
         around: &Surroundings,
-        casters: Vec<Caster>,
+        snapshots: &[Arc<Snapshot>; 2],
         mut report: impl FnMut(String),
     ) -> bool {
         self.faces.clear();
         self.shares.clear();
         let limit = device.limits().max_texture_dimension_2d;
         let mut wanted: Vec<Wanted> = Vec::new();
-        let any_has_holes = casters.iter().any(|c| c.has_holes);
+        let any_has_holes = snapshots[1].pages.iter().any(|page| !page.is_empty());
         for index in (0..scene.lights.len()).filter(|index| draws_map(scene, *index, any_has_holes)) {
             let light = &ranged(&scene.lights[index], around.casters);
             let size = light.map.size.clamp(1, limit);
@@ -143,14 +149,7 @@ impl Maps {
             wanted.push(Wanted { index, is_frozen, fits, demand: Demand { size, faces, level } });
         }
         self.levels = wanted.iter().map(|w| (w.index, w.demand.level)).collect();
-        if wanted.is_empty() {
-            self.held.clear();
-            return false;
-        }
         let (tiles, is_new) = self.make_room(device, &wanted, scene.map_memory_bytes);
-        let radius = around.casters.radius();
-        let with_holes = casters.iter().filter(|c| c.has_holes).cloned().collect();
-        let snapshots = [casters, with_holes].map(|casters| Arc::new(Snapshot { casters, radius }));
         let mut motions: HashMap<[*const Snapshot; 2], Motion> = HashMap::new();
         let mut old = std::mem::take(&mut self.held);
         for (wanted, tiles) in wanted.into_iter().zip(tiles) {
@@ -227,7 +226,7 @@ impl Maps {
             let (projection, place) = (fit.projection, tile.1);
             let waits = light.map.update == MapUpdate::Never && light.map.request == Some(0);
             let is_empty = waits && held.is_none_or(|h| h.is_empty);
-            let (index, draws) = (wanted.index, Vec::new());
+            let (index, draws) = (wanted.index, Arc::default());
             let holes_only = maps_holes_only(light);
             self.faces.push(Face {
                 light: index,
@@ -303,13 +302,10 @@ impl Maps {
             if face.is_empty {
                 continue;
             }
-            let planes = Planes::new(&map_from_world);
-            let holes_only = face.holes_only;
-            face.draws =
-                draws.cull(&planes, |_, casting, _| casting == Casting::Holed || casting == Casting::Whole && !holes_only).0;
-            for draw in &face.draws {
-                let key = pipeline::key_of(&draws.batches[draw.batch as usize].kind);
-                self.pipelines.entry(key).or_insert_with(|| pipeline::of_kind(device, &self.module, &self.layout, key));
+            face.draws = draws.casters(&map_from_world, face.holes_only).draws;
+            for draw in &*face.draws {
+                let key = pipeline::key_of(&draws.batches()[draw.batch as usize].kind);
+                self.pipelines.entry(key).or_insert_with(|| pipeline::of_kind(device, &self.module, &self.layouts, key));
             }
         }
     }
@@ -378,11 +374,12 @@ impl Maps {
         redrawn
     }
 
-    /// Sets the pipeline of a kind of caster.
-    pub(crate) fn set_pipeline(&self, pass: &mut wgpu::RenderPass<'_>, kind: &Kind) {
+    /// Sets the pipeline of a kind of caster, and tells what it reads.
+    pub(crate) fn set_pipeline(&self, pass: &mut wgpu::RenderPass<'_>, kind: &Kind) -> Reads {
         if let Some(pipeline) = self.pipelines.get(&pipeline::key_of(kind)) {
             pass.set_pipeline(pipeline);
         }
+        pipeline::reads(kind)
     }
 }
 

@@ -1,25 +1,47 @@
 //! Pipelines of shadow maps.
 
 use super::MAP_FORMAT;
-use crate::cache::VERTEX_BUFFERS;
+use crate::cache::{POSITION_BUFFERS, VERTEX_BUFFERS};
 use crate::draws::{Alpha, Kind};
+use crate::layouts::Layouts;
+use crate::record::Reads;
 
 /// Topology, and whether there are holes.
 pub(crate) fn key_of(kind: &Kind) -> (u8, bool) {
     (kind.topology, kind.alpha == Alpha::Mask)
 }
 
+/// What the pipeline of a kind reads.
+pub(crate) fn reads(kind: &Kind) -> Reads {
+    if key_of(kind).1 { Reads::All } else { Reads::Positions }
+}
+
+/// Layouts of the pipelines: of casters that are whole, and of those with holes.
+pub(crate) fn layouts(device: &wgpu::Device, layouts: &Layouts) -> [wgpu::PipelineLayout; 2] {
+    let groups = [&layouts.view, &layouts.instances, &layouts.material].map(Some);
+    [&groups[..2], &groups[..]].map(|bind_group_layouts| {
+        device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("maps"),
+            bind_group_layouts,
+            immediate_size: 0,
+        })
+    })
+}
+
 /// The pipeline that draws casters of a kind, see [`key_of`].
 pub(crate) fn of_kind(
     device: &wgpu::Device,
     module: &wgpu::ShaderModule,
-    layout: &wgpu::PipelineLayout,
+    [whole, with_holes]: &[wgpu::PipelineLayout; 2],
     (topology, holed): (u8, bool),
 ) -> wgpu::RenderPipeline {
     let topology = crate::surface::topology_of(topology);
-    let (vertex, fragment) = if holed { ("holed", Some("cut")) } else { ("solid", None) };
     let nearest = Some(wgpu::CompareFunction::Greater);
-    pipeline(device, module, layout, vertex, fragment, topology, nearest, &VERTEX_BUFFERS)
+    if holed {
+        pipeline(device, module, with_holes, "holed", Some("cut"), topology, nearest, &VERTEX_BUFFERS)
+    } else {
+        pipeline(device, module, whole, "solid", None, topology, nearest, &POSITION_BUFFERS)
+    }
 }
 
 /// The pipeline that empties a tile.

@@ -18,7 +18,8 @@ fn scene(material: Material, shadows: ShadowMethod) -> Scene {
         drawables: vec![
             shape(plane(12.0), material, Mat4::IDENTITY),
             shape(cuboid(Vec3::splat(1.0)), matt(0.8, 0.8, 0.8), at(2.0, 2.0, 0.0)),
-        ],
+        ]
+        .into(),
         lights: vec![light],
         ambient: Vec3::splat(0.1),
         ..Default::default()

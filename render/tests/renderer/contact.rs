@@ -87,7 +87,8 @@ fn texel(light: &Light) -> f32 {
 /// How far light reaches behind the line where a caster touches the floor, texels.
 fn gap(shooter: &mut Shooter, name: &str, caster: &Touching, light: &Light) -> f32 {
     let floor = shape(plane(20.0), grey(), Mat4::IDENTITY);
-    let scene = Scene { drawables: vec![floor, caster.drawable.clone()], lights: vec![light.clone()], ..Default::default() };
+    let scene =
+        Scene { drawables: vec![floor, caster.drawable.clone()].into(), lights: vec![light.clone()], ..Default::default() };
     let texel = texel(light);
     let elevation = (1.2 * (FRAC_PI_2 - caster.lean)).min(1.0) * 0.7;
     // From behind, below what leans over.

@@ -12,7 +12,12 @@ fn grey(size: Vec3, x: f32, y: f32, z: f32) -> Drawable {
 
 fn scene(drawables: Vec<Drawable>, style: ContourStyle) -> Scene {
     let all = (0..drawables.len()).collect();
-    Scene { drawables, ambient: Vec3::ONE, contours: vec![ContourGroup { drawables: all, style }], ..Scene::default() }
+    Scene {
+        drawables: drawables.into(),
+        ambient: Vec3::ONE,
+        contours: vec![ContourGroup { drawables: all, style }],
+        ..Scene::default()
+    }
 }
 
 fn is_ink(shot: &Shot, x: u32, y: u32) -> bool {

@@ -63,9 +63,9 @@ fn the_gpu_deforms_as_the_cpu_does() {
             posed.pose = Some(pose.clone());
             let picture =
                 Picture::mono(look(&format!("deformed_{name}_{shadows:?}"), Vec3::new(3.0, 3.0, 5.0), Vec3::Y, [160, 120]));
-            scene.drawables = vec![floor.clone(), posed];
+            scene.drawables = vec![floor.clone(), posed].into();
             let ours = shoot(&scene, &picture);
-            scene.drawables = vec![floor, shape(baked, matt(0.7, 0.4, 0.3), place)];
+            scene.drawables = vec![floor, shape(baked, matt(0.7, 0.4, 0.3), place)].into();
             let truth = shoot(&scene, &picture);
             let differ = ours.layers[0].rgba.iter().zip(&truth.layers[0].rgba).filter(|(a, b)| a.abs_diff(**b) > 8).count();
             assert!(differ < 30, "{name} {shadows:?}: {differ} bytes differ");
@@ -84,7 +84,7 @@ fn each_pose_is_computed_once() {
     let mut posed = shape_of(&mesh, &Arc::new(matt(0.5, 0.5, 0.5)), Mat4::IDENTITY);
     posed.pose = pose(0.5);
     let mut scene = Scene {
-        drawables: vec![posed.clone(), posed],
+        drawables: vec![posed.clone(), posed].into(),
         lights: vec![Light { shadows: ShadowMethod::Map, ..noon() }],
         ..Default::default()
     };

@@ -13,7 +13,7 @@ fn cards() -> (Scene, [View; 2]) {
     };
     let drawables = vec![card(-5.0, Vec4::new(0.25, 0.5, 0.75, 1.0)), card(5.0, Vec4::new(0.75, 0.25, 0.5, 1.0))];
     let over = |x: f32| look("over", Vec3::new(x, 2.0, 0.0), Vec3::new(x, 0.0, 0.0), [32, 32]);
-    (Scene { drawables, ..Default::default() }, [over(-5.0), over(5.0)])
+    (Scene { drawables: drawables.into(), ..Default::default() }, [over(-5.0), over(5.0)])
 }
 
 fn picture(views: [View; 2], size: [u32; 2], layout: Layout) -> Picture {

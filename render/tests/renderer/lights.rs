@@ -6,7 +6,7 @@ use umbriel_scene::*;
 
 fn floor_under(light: Light) -> Scene {
     Scene {
-        drawables: vec![shape(plane(20.0), matt(0.5, 0.25, 0.125), Mat4::IDENTITY)],
+        drawables: vec![shape(plane(20.0), matt(0.5, 0.25, 0.125), Mat4::IDENTITY)].into(),
         lights: vec![light],
         ..Default::default()
     }
@@ -57,7 +57,7 @@ fn what_needs_no_light() {
     assert_colour(shoot(&scene, &from_above("exposure")).centre(), [0.3, 0.15, 0.075], "exposure");
     scene.exposure = 1.0;
     let unlit = Material { shading: Shading::Unlit, base_color: Vec4::new(0.2, 0.4, 0.6, 1.0), ..Default::default() };
-    scene.drawables = vec![shape(plane(20.0), unlit, Mat4::IDENTITY)];
+    scene.drawables = vec![shape(plane(20.0), unlit, Mat4::IDENTITY)].into();
     assert_colour(shoot(&scene, &from_above("unlit")).centre(), [0.2, 0.4, 0.6], "unlit");
     scene.drawables[0].material = Material { emissive: Vec3::new(0.1, 0.0, 0.0), ..matt(0.0, 0.0, 0.0) }.into();
     assert_colour(shoot(&scene, &from_above("emissive")).centre(), [0.1, 0.0, 0.0], "emissive");

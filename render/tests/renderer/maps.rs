@@ -20,7 +20,7 @@ fn balls(places: &[[f32; 3]], lights: Vec<Light>) -> Scene {
     let (mesh, material) = (ball(16).into(), matt(0.8, 0.3, 0.2).into());
     let at = |p: &[f32; 3]| Mat4::from_translation(Vec3::from(*p)) * Mat4::from_scale(Vec3::splat(0.5));
     drawables.extend(places.iter().map(|p| shape_of(&mesh, &material, at(p))));
-    Scene { drawables, lights, ..Default::default() }
+    Scene { drawables: drawables.into(), lights, ..Default::default() }
 }
 
 fn move_shape(scene: &mut Scene, index: usize, by: Vec3) {

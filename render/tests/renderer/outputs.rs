@@ -18,7 +18,8 @@ fn scene() -> Scene {
         drawables: vec![
             shape(plane(9.0), matt(0.5, 0.25, 0.75), Mat4::IDENTITY),
             shape(cuboid(Vec3::ONE), matt(0.9, 0.9, 0.9), at(0.0, 1.0, 0.0)),
-        ],
+        ]
+        .into(),
         lights: vec![
             light(LightKind::Point, ShadowMethod::None),
             light(spot, ShadowMethod::Map),

@@ -8,7 +8,7 @@ use umbriel_scene::*;
 /// A floor of a material, and a ball that hovers over its middle.
 fn ball_over(floor: Material, lights: Vec<Light>) -> Scene {
     let ball = shape(ball(48), matt(0.8, 0.3, 0.2), at(0.0, 2.0, 0.0) * Mat4::from_scale(Vec3::splat(0.7)));
-    Scene { drawables: vec![shape(plane(12.0), floor, Mat4::IDENTITY), ball], lights, ..Default::default() }
+    Scene { drawables: vec![shape(plane(12.0), floor, Mat4::IDENTITY), ball].into(), lights, ..Default::default() }
 }
 
 /// From below the ball to the floor: its shadow in the middle, light in the corners.

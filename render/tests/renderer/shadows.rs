@@ -10,7 +10,7 @@ const RADIUS: f32 = 0.7;
 fn ball_over_floor(light: Light) -> Scene {
     let floor = shape(plane(12.0), matt(0.5, 0.5, 0.5), Mat4::IDENTITY);
     let ball = shape(ball(96), matt(0.8, 0.3, 0.2), Mat4::from_translation(CENTRE) * Mat4::from_scale(Vec3::splat(RADIUS)));
-    Scene { drawables: vec![floor, ball], lights: vec![light], ..Default::default() }
+    Scene { drawables: vec![floor, ball].into(), lights: vec![light], ..Default::default() }
 }
 
 /// How far a point of the floor is inside of the ball's shadow, metres; negative outside.

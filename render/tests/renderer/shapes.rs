@@ -24,7 +24,7 @@ fn the_nearest_of_all_is_seen() {
     let near = || card(unlit(1.0, 0.0, 0.0, 1.0), 1.0, 2.0);
     let far = || card(unlit(0.0, 1.0, 0.0, 1.0), -1.0, 2.0);
     for drawables in [vec![near(), far()], vec![far(), near()]] {
-        let shot = shoot(&Scene { drawables, ..Default::default() }, &ahead("nearest"));
+        let shot = shoot(&Scene { drawables: drawables.into(), ..Default::default() }, &ahead("nearest"));
         assert_eq!(shot.centre(), [255, 0, 0, 255]);
     }
 }
@@ -51,7 +51,7 @@ fn back_faces_are_seen_where_they_should() {
         ("double-sided mirrored back", turned(mirrored(card(both, 0.0, 2.0))), 255),
     ];
     for (name, drawable, expected) in rows {
-        let shot = shoot(&Scene { drawables: vec![drawable], ..Default::default() }, &ahead("back_faces"));
+        let shot = shoot(&Scene { drawables: vec![drawable].into(), ..Default::default() }, &ahead("back_faces"));
         assert_eq!(shot.centre()[0], expected, "{name}");
     }
 }
@@ -73,8 +73,10 @@ fn normals_follow_mirrors_and_backs() {
         ("uneven", shape(cuboid(Vec3::splat(2.0)), matt(0.5, 0.5, 0.5), uneven), 0.5 * n.z),
     ];
     for (name, drawable, value) in rows {
-        let shot =
-            shoot(&Scene { drawables: vec![drawable], lights: vec![light.clone()], ..Default::default() }, &ahead("normals"));
+        let shot = shoot(
+            &Scene { drawables: vec![drawable].into(), lights: vec![light.clone()], ..Default::default() },
+            &ahead("normals"),
+        );
         assert_colour(shot.centre(), [value; 3], name);
     }
 }
@@ -85,7 +87,7 @@ fn half_transparent_shapes_lie_over_each_other() {
     let green = || card(Material { alpha: AlphaMode::Blend, ..unlit(0.0, 1.0, 0.0, 0.25) }, 0.0, 2.0);
     let blue = || card(unlit(0.0, 0.0, 1.0, 1.0), -1.0, 3.0);
     for drawables in [vec![red(), green(), blue()], vec![green(), blue(), red()], vec![blue(), red(), green()]] {
-        let shot = shoot(&Scene { drawables, ..Default::default() }, &ahead("blend"));
+        let shot = shoot(&Scene { drawables: drawables.into(), ..Default::default() }, &ahead("blend"));
         assert_colour(shot.centre(), [0.5, 0.5 * 0.25, 0.5 * 0.75], "red over green over blue");
     }
 }
@@ -100,7 +102,8 @@ fn alpha_cuts_holes() {
     for (alpha, right) in [(AlphaMode::Opaque, 255), (AlphaMode::Mask { cutoff: 0.5 }, 0), (AlphaMode::Mask { cutoff: 0.2 }, 255)]
     {
         material.alpha = alpha;
-        let shot = shoot(&Scene { drawables: vec![card(material.clone(), 0.0, 3.0)], ..Default::default() }, &ahead("mask"));
+        let shot =
+            shoot(&Scene { drawables: vec![card(material.clone(), 0.0, 3.0)].into(), ..Default::default() }, &ahead("mask"));
         assert_eq!([shot.pixel(20, 32)[0], shot.pixel(44, 32)[0]], [255, right], "{alpha:?}");
     }
 }
@@ -131,7 +134,7 @@ fn textures_are_looked_up_where_they_should() {
         ("second set", texture(Default::default(), 1), texel(1, 0), texel(0, 0)),
         ("moved by half", texture(half, 0), texel(1, 0), texel(0, 0)),
     ] {
-        let scene = Scene { drawables: vec![shape(mesh.clone(), material, facing)], ..Default::default() };
+        let scene = Scene { drawables: vec![shape(mesh.clone(), material, facing)].into(), ..Default::default() };
         let shot = shoot(&scene, &ahead("textures"));
         assert_eq!(
             (shot.pixel(20, 20)[..3].to_vec(), shot.pixel(44, 20)[..3].to_vec()),
@@ -188,7 +191,7 @@ fn lines_and_points_show_their_colour() {
     let field: Vec<Vec3> =
         (0..10_000).map(|i| Vec3::new((i % 100) as f32 * 0.01 - 0.5, (i / 100) as f32 * 0.01 - 0.5, 0.0)).collect();
     for (name, mesh) in [("line", mesh(Topology::Lines, crossing)), ("points", mesh(Topology::Points, field))] {
-        let scene = Scene { drawables: vec![shape(mesh, matt(0.0, 1.0, 0.0), Mat4::IDENTITY)], ..Default::default() };
+        let scene = Scene { drawables: vec![shape(mesh, matt(0.0, 1.0, 0.0), Mat4::IDENTITY)].into(), ..Default::default() };
         let shot = shoot(&scene, &ahead(name));
         let brightest = (28..36).map(|y| shot.pixel(32, y)[1]).max().unwrap();
         assert!(brightest > 100 && shot.pixel(32, 5)[1] == 0, "{name}: {brightest}");
@@ -205,7 +208,7 @@ fn fog_and_background_follow_their_laws() {
         ("exponential", fog(FogKind::Exponential, 20.0), e(5.0, 20.0)),
         ("thick", fog(FogKind::Linear, 4.0), 0.0),
     ] {
-        let scene = Scene { drawables: vec![card(unlit(1.0, 0.0, 0.0, 1.0), 0.0, 3.0)], fog, ..Default::default() };
+        let scene = Scene { drawables: vec![card(unlit(1.0, 0.0, 0.0, 1.0), 0.0, 3.0)].into(), fog, ..Default::default() };
         assert_colour(shoot(&scene, &ahead("fog")).centre(), [red, 0.0, 1.0 - red], name);
     }
     let background = Background { zenith: Vec3::X, horizon: Vec3::Y, nadir: Vec3::Z };
@@ -226,7 +229,7 @@ fn fog_and_background_follow_their_laws() {
 fn bad_input_is_told_once_and_the_rest_is_drawn() {
     let (_turn, gpu) = gpu();
     let mut renderer = Renderer::new(gpu).unwrap();
-    let mut scene = Scene { drawables: vec![card(unlit(1.0, 1.0, 1.0, 1.0), 0.0, 3.0)], ..Default::default() };
+    let mut scene = Scene { drawables: vec![card(unlit(1.0, 1.0, 1.0, 1.0), 0.0, 3.0)].into(), ..Default::default() };
     let wrong_index = Mesh { name: "wild".into(), indices: [0, 1, 99].into(), ..plane(1.0) };
     let short = Image { width: 4, height: 4, rgba: Arc::new([0; 3]) };
     let texture = TextureRef { image: Arc::new(short), sampler: Sampler::default(), uv_set: 0, uv_from_mesh: Default::default() };

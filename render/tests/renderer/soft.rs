@@ -54,7 +54,7 @@ fn visibility(name: &str, scene: &Scene, view: &View) -> Vec<u8> {
 
 /// Score of the first light's shadow against rays.
 fn score(name: &str, drawables: &[Drawable], light: Light, view: &View) -> PenumbraScore {
-    let scene = Scene { drawables: drawables.to_vec(), lights: vec![light], ..Default::default() };
+    let scene = Scene { drawables: drawables.to_vec().into(), lights: vec![light], ..Default::default() };
     let seen = visibility(name, &scene, view);
     let options = TraceOptions { sub_samples: 2, ..Default::default() };
     let shares = Tracer::new(&scene).shares(&scene.lights[0], view, &options, 128, &|_| ()).unwrap();
@@ -93,14 +93,14 @@ fn penumbrae_are_those_of_the_lights_disc() {
 fn a_point_of_light_throws_the_hard_shadow_to_the_byte() {
     let view = view("soft_zero", [160, 120]);
     let shot = |light| {
-        let scene = Scene { drawables: pillar_and_ball(), lights: vec![light], ..Default::default() };
+        let scene = Scene { drawables: pillar_and_ball().into(), lights: vec![light], ..Default::default() };
         shoot(&scene, &Picture::mono(view.clone())).layers
     };
     let hard = shot(Light { soft: false, ..slanted(0.0) });
     assert!(hard == shot(slanted(0.0)));
     assert!(hard != shot(slanted(0.05)));
     // A shadow that takes half of the light.
-    let dark = Scene { drawables: pillar_and_ball(), lights: vec![slanted(0.0)], ..Default::default() };
+    let dark = Scene { drawables: pillar_and_ball().into(), lights: vec![slanted(0.0)], ..Default::default() };
     let lit = shot(Light { shadows: ShadowMethod::None, ..slanted(0.0) });
     let pale = shot(Light { shadow_intensity: 0.5, soft: false, ..slanted(0.0) });
     let (mut compared, mut wrong) = (0, 0);
@@ -131,7 +131,7 @@ fn the_soft_outline_expands_with_distance_as_the_paper_measured() {
         let board = shape(cuboid(Vec3::new(WIDTH_M, 0.001, 8.0)), matt(0.5, 0.5, 0.5), at(0.0, distance, 0.0));
         let sun = Light { shadows: ShadowMethod::Volume, soft: true, size: Light::SUN_SIZE, ..noon() };
         let floor = shape(plane(8.0), matt(0.5, 0.5, 0.5), Mat4::IDENTITY);
-        let scene = Scene { drawables: vec![floor, board], lights: vec![sun], ..Default::default() };
+        let scene = Scene { drawables: vec![floor, board].into(), lights: vec![sun], ..Default::default() };
         let eye = Vec3::new(0.0, 0.25, 0.0);
         let mut view = look("soft_table_1", eye, Vec3::ZERO, [1000, 8]);
         view.frustum = Frustum { left: -0.08, right: 0.08, bottom: -0.00064, top: 0.00064, near: 0.1 };
@@ -156,7 +156,7 @@ fn two_lights_are_masked_each_by_its_own() {
     let other = Light { direction: Vec3::new(-0.5, -0.8, 0.1).normalize(), color: Vec3::new(0.1, 0.2, 0.5), ..slanted(0.08) };
     let one = Light { color: Vec3::new(0.5, 0.3, 0.1), ..slanted(0.04) };
     let shot = |lights: Vec<Light>| {
-        let scene = Scene { drawables: pillar_and_ball(), lights, ..Default::default() };
+        let scene = Scene { drawables: pillar_and_ball().into(), lights, ..Default::default() };
         shoot(&scene, &Picture::mono(view.clone())).layers.remove(0).rgba
     };
     let (both, a, b) = (shot(vec![one.clone(), other.clone()]), shot(vec![one]), shot(vec![other]));
@@ -172,7 +172,8 @@ fn a_film_is_as_strong_as_the_shadow() {
     let film = Film { color: glam::Vec4::new(0.0, 0.0, 0.0, 0.5) };
     let group = StencilGroup { name: "group".into(), light: 0, casters: vec![1, 2], mode: StencilMode::Modulative(film) };
     let light = Light { shadows: ShadowMethod::None, ..slanted(0.08) };
-    let scene = Scene { drawables: pillar_and_ball(), lights: vec![light], stencil_groups: vec![group], ..Default::default() };
+    let scene =
+        Scene { drawables: pillar_and_ball().into(), lights: vec![light], stencil_groups: vec![group], ..Default::default() };
     let bare = Scene { stencil_groups: Vec::new(), ..scene.clone() };
     let shot = |scene: &Scene| shoot(scene, &Picture::mono(view.clone())).layers.remove(0).rgba;
     let (with, without, shown) = (shot(&scene), shot(&bare), visibility("soft_film_shown", &scene, &view));
@@ -196,7 +197,8 @@ fn nothing_bleeds_over_the_rim_of_what_stands_before() {
     let post = shape(cuboid(Vec3::new(0.12, 3.0, 0.12)), matt(0.5, 0.5, 0.5), at(1.5, 1.5, 3.2));
     let post = Drawable { casts_shadow: false, ..post };
     let view = view("soft_bleeding", [240, 180]);
-    let scene = |drawables| Scene { drawables, lights: vec![slanted(0.1)], ..Default::default() };
+    let scene =
+        |drawables: Vec<Drawable>| Scene { drawables: drawables.into(), lights: vec![slanted(0.1)], ..Default::default() };
     let without = visibility("soft_bleeding_without", &scene(shapes.clone()), &view);
     shapes.push(post.clone());
     let with = visibility("soft_bleeding", &scene(shapes), &view);

@@ -15,7 +15,7 @@ fn picture(rgba: [u8; 4]) -> Option<TextureRef> {
 fn floor_colour(name: &str, mesh: Mesh, material: Material, eye: Vec3, ambient: f32) -> [u8; 4] {
     let light = Light { direction: Vec3::new(1.0, -1.0, 0.0).normalize(), ..noon() };
     let scene = Scene {
-        drawables: vec![shape(mesh, material, Mat4::IDENTITY)],
+        drawables: vec![shape(mesh, material, Mat4::IDENTITY)].into(),
         lights: vec![light],
         ambient: Vec3::splat(ambient),
         ..Default::default()

@@ -176,7 +176,7 @@ fn bias_tunes_itself() {
     ];
     let mut failed = Vec::new();
     for (name, drawables, light, eyes, out, least) in rows {
-        let scene = Scene { drawables, lights: vec![light], ..Default::default() };
+        let scene = Scene { drawables: drawables.into(), lights: vec![light], ..Default::default() };
         let (away, score) = scored(&format!("bias_{name}"), &scene, eyes, out);
         if away.dark >= 0.0002 || away.lit >= 0.0002 || score.iou < least {
             failed.push(name);
@@ -194,7 +194,7 @@ fn holes_are_left_to_maps() {
         ("bulb", by_volume(Light { kind: LightKind::Point, position: Vec3::new(1.0, 5.0, 1.5), ..noon() })),
     ];
     for (name, light) in lights {
-        let mut scene = Scene { drawables: forest(), lights: vec![light], ..Default::default() };
+        let mut scene = Scene { drawables: forest().into(), lights: vec![light], ..Default::default() };
         let (away, score) = scored(&format!("holes_{name}"), &scene, [[2.5, 5.0, 6.0], [0.3, 0.0, 0.0]], Vec3::ZERO);
         assert!(away.dark < 0.0002 && away.lit < 0.0002 && score.iou > 0.98, "{name}");
 
@@ -227,7 +227,7 @@ fn leaves_are_as_soft_as_volumes() {
     let leaves: Vec<Drawable> = forest().into_iter().take(40).collect();
     let half_lit = |soft: bool| {
         let light = Light { soft, size: 0.05, shadows: ShadowMethod::Volume, ..sun(Vec3::new(0.4, -1.0, -0.3)) };
-        let scene = Scene { drawables: leaves.clone(), lights: vec![light], ..Default::default() };
+        let scene = Scene { drawables: leaves.clone().into(), lights: vec![light], ..Default::default() };
         let view = look(&format!("leaves_{soft}"), Vec3::new(2.0, 2.5, 2.0), Vec3::new(0.8, 0.0, -0.5), [160, 120]);
         let shot = shoot(&scene, &Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view) });
         shot.layers[0].rgba.chunks_exact(4).filter(|p| (30..225).contains(&p[0])).count()
@@ -247,7 +247,7 @@ fn penumbrae_follow_from_the_size_of_the_light() {
     let position = Vec3::new(-1.5, 4.0, -1.2);
     let lamp = Light { kind: spot, position, direction: -position.normalize(), size: 0.15, shadows: ShadowMethod::Map, ..noon() };
     for (name, light) in [("sun", wide_sun), ("spot", lamp)] {
-        let scene = Scene { drawables: drawables.clone(), lights: vec![light], ..Default::default() };
+        let scene = Scene { drawables: drawables.clone().into(), lights: vec![light], ..Default::default() };
         let view = look(&format!("penumbra_{name}"), Vec3::new(0.5, 3.0, 3.5), Vec3::new(0.2, 0.2, 0.2), [240, 180]);
         let options = TraceOptions { sub_samples: 1, eps_scale: 1e-6, ..Default::default() };
         let truth = Tracer::new(&scene).shares(&scene.lights[0], &view, &options, 96, &|_| ()).unwrap();
@@ -278,7 +278,7 @@ fn thin_casters_are_found_by_pcss() {
     let map = MapSettings { filter: MapFilter::Pcss, size: 256, ..Default::default() };
     let light =
         Light { kind, position, direction: (-position).normalize(), size: 0.12, shadows: ShadowMethod::Map, map, ..noon() };
-    let scene = Scene { drawables, lights: vec![light], ..Default::default() };
+    let scene = Scene { drawables: drawables.into(), lights: vec![light], ..Default::default() };
     let view = look("thin_by_pcss", Vec3::new(1.2, 2.2, 1.6), Vec3::new(0.25, 0.1, -0.3), [320, 240]);
     let shot = shoot(&scene, &Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view) });
     let value = |x: u32, y: u32| shot.pixel(x, y)[0];
@@ -296,7 +296,7 @@ fn thin_casters_are_found_by_pcss() {
 fn edges_stand_still_while_a_head_moves() {
     let mut drawables = field();
     drawables.extend(railings());
-    let scene = Scene { drawables, lights: vec![sun(Vec3::new(0.5, -0.8, 0.3))], ..Default::default() };
+    let scene = Scene { drawables: drawables.into(), lights: vec![sun(Vec3::new(0.5, -0.8, 0.3))], ..Default::default() };
     let size = [96, 72];
     let eye = Vec3::new(1.0, 1.7, 5.0);
     let target = Vec3::new(0.5, 0.0, 0.8);

@@ -145,7 +145,7 @@ mod tests {
         let hidden = Drawable { visible: false, ..square(at(3.0), true) };
         let turned = square(at(2.0) * Mat4::from_rotation_y(std::f32::consts::PI), false);
         let large = square(at(-5.0) * Mat4::from_scale(Vec3::new(-8.0, 4.0, 1.0)), true);
-        let scene = Scene { drawables: vec![hidden, turned, square(at(1.0), false), large], ..Scene::default() };
+        let scene = Scene { drawables: vec![hidden, turned, square(at(1.0), false), large].into(), ..Scene::default() };
         let rows = [
             // Through what is hidden and what is seen from behind to the third.
             (Vec3::new(0.5, 0.5, 9.0), Vec3::NEG_Z, Some((2, 8.0))),

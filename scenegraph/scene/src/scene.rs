@@ -1,6 +1,6 @@
 //! What there is to draw.
 
-use crate::{Aabb, Light, Material, Mesh, Projector};
+use crate::{Aabb, Drawables, Light, Material, Mesh, Projector};
 use glam::{Mat4, Vec3, Vec4};
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Shapes. A place may be vacant ([`Drawable::visible`] false); places keep their shape as long as it lives.
-    pub drawables: Vec<Drawable>,
+    pub drawables: Drawables,
     /// Which of them are reduced casters: never seen, they throw the shadows of others.
     pub stand_ins: Vec<StandIn>,
     /// Light sources that are switched on, then those that only draw maps ([`Light::shines`]).
@@ -43,7 +43,7 @@ impl Default for Scene {
     /// Nothing, as a camera without correction sees it.
     fn default() -> Scene {
         Scene {
-            drawables: Vec::new(),
+            drawables: Drawables::default(),
             stand_ins: Vec::new(),
             lights: Vec::new(),
             receive_lists: Vec::new(),

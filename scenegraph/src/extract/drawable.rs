@@ -72,10 +72,9 @@ impl Slots {
 
     /// Empties a place. True if something was drawn there.
     pub(super) fn vacate(&mut self, scene: &mut Scene, slot: u32) -> bool {
-        let drawable = &mut scene.drawables[slot as usize];
-        let was_visible = drawable.visible;
+        let was_visible = scene.drawables[slot as usize].visible;
         self.writes += 1;
-        *drawable = Drawable { revision: self.writes, ..vacant() };
+        scene.drawables[slot as usize] = Drawable { revision: self.writes, ..vacant() };
         was_visible
     }
 
@@ -116,13 +115,14 @@ impl Slots {
             let changed = scene.drawables[instance.slot as usize].visible && self.vacate(scene, instance.slot);
             return Written { changed, casting: changed };
         };
-        let old = &mut scene.drawables[slot as usize];
+        let old = &scene.drawables[slot as usize];
         // What is not drawn keeps its last pose: a broken matrix must not reach the renderer.
         if !new.visible && !old.visible || same(old, &new) {
             return Written { changed: false, casting: false };
         }
         self.writes += 1;
         let casting = (old.visible && old.casts_shadow) != (new.visible && new.casts_shadow);
+        let old = &mut scene.drawables[slot as usize];
         if new.visible {
             *old = Drawable { revision: self.writes, ..new };
         } else {

@@ -81,13 +81,14 @@ pub(super) fn place(
         let casts = state.casts_shadow;
         let chosen =
             state.caster.as_ref().filter(|c| casts && scene.drawables[slot].visible && suits(c, &scene.drawables[slot], head));
-        let shown = &mut scene.drawables[slot];
         let itself = casts && chosen.is_none();
-        if shown.visible && shown.casts_shadow != itself {
+        if scene.drawables[slot].visible && scene.drawables[slot].casts_shadow != itself {
+            let shown = &mut scene.drawables[slot];
             shown.casts_shadow = itself;
             shown.revision += 1;
         }
         let Some(caster) = chosen else { continue };
+        let shown = &scene.drawables[slot];
         let moves = !caster.mesh.joints.is_empty() || !caster.mesh.morph_targets.is_empty();
         let pose = shown.pose.clone().filter(|_| moves);
         let at_rest = caster.mesh.bounds.transformed(&shown.world_from_object);

@@ -7,7 +7,7 @@ use shapes::*;
 use std::sync::Arc;
 
 fn scene(drawables: Vec<Drawable>) -> Scene {
-    Scene { drawables, ..Scene::default() }
+    Scene { drawables: drawables.into(), ..Scene::default() }
 }
 
 /// What the light does at the point where a ray from `eye` towards `target` ends.
