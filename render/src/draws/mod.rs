@@ -142,6 +142,9 @@ pub(crate) struct Caches<'a> {
 
 const NOTHING: u32 = u32::MAX;
 
+/// Instances between two that changed that are sent along: to begin another write costs more than these 128 kB.
+const MOST_BETWEEN: usize = 1024;
+
 impl Draws {
     /// Starts a frame. Gives the pages of drawables that may have changed since the last one.
     pub(crate) fn begin(&mut self, drawables: &Drawables, stand_ins: &[StandIn]) -> Vec<usize> {
@@ -249,7 +252,7 @@ impl Draws {
             let page = Drawables::places(index / Drawables::PAGE, self.slots.len());
             match self.unsent.last_mut() {
                 Some(last) if last.contains(&index) => {}
-                Some(last) if last.end == page.start => last.end = page.end,
+                Some(last) if (last.start..=last.end + MOST_BETWEEN).contains(&page.start) => last.end = last.end.max(page.end),
                 _ => self.unsent.push(page),
             }
         }
