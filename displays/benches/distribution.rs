@@ -1,4 +1,5 @@
-//! An application and four display processes on loopback: `cargo bench -p umbriel-displays --features cluster --bench distribution`.
+//! An application and four display processes on loopback: `cargo bench -p umbriel-displays --features cluster --bench distribution`;
+//! `-- --displays 1` for another number of them.
 //!
 //! Each frame writes translation, rotation and scale of 10 000 transforms, or of one. Displays apply and verify them, and draw nothing. The
 //! measure beside it is TCP that sends the same bytes to four processes, each of which answers with one byte.
@@ -14,7 +15,6 @@ use umbriel_fields::replica::{Bulk, Packet, Publisher, Replica};
 use umbriel_fields::{FieldId, Graph, NodeType, TypeRegistry, builtin_types};
 use umbriel_scenegraph::{new_graph, node_types};
 
-const DISPLAYS: usize = 4;
 const TRANSFORMS: usize = 10_000;
 const FIELDS: usize = 3;
 /// Frames that are measured in each row.
@@ -44,7 +44,7 @@ fn main() -> Result<(), Failure> {
     }
     match (place("--display"), place("--name")) {
         (Some(endpoint), Some(name)) => display(endpoint, &name),
-        _ => application(),
+        _ => application(place("--displays").map_or(Ok(4), |count| count.parse())?),
     }
 }
 
@@ -135,18 +135,18 @@ fn parts() -> Result<(), Failure> {
     Ok(())
 }
 
-fn application() -> Result<(), Failure> {
+fn application(display_count: usize) -> Result<(), Failure> {
     parts()?;
     let (mut graph, fields) = world()?;
     let endpoint = format!("tcp/{}", free_address()?);
     let mut host =
         Host::listen(&HostOptions { listen: endpoint.clone(), security: Security::Loopback, timeout: TIMEOUT, lease: LEASE })?;
     let mut displays = Vec::new();
-    for number in 0..DISPLAYS {
+    for number in 0..display_count {
         displays.push(again(&["--display", &endpoint, "--name", &number.to_string()])?);
     }
     host.frame(&graph, false);
-    while host.in_time() < DISPLAYS {
+    while host.in_time() < display_count {
         host.wait_until(&graph, Instant::now() + Duration::from_millis(10));
     }
     let mut bytes_of_frame = 0;
@@ -155,7 +155,7 @@ fn application() -> Result<(), Failure> {
         ("10 000 transforms at 60 Hz", TRANSFORMS, Duration::from_micros(16_667)),
         ("one transform at 60 Hz", 1, Duration::from_micros(16_667)),
     ] {
-        let (bytes, from) = (host.report().bytes, host.report().waits_us.len());
+        let (bytes, waits) = (host.report().bytes, host.report().waits.clone());
         let started = Instant::now();
         for frame in 0..FRAMES {
             write(&mut graph, &fields[..count], frame)?;
@@ -166,30 +166,32 @@ fn application() -> Result<(), Failure> {
         }
         let bytes = (host.report().bytes - bytes) as f64 / FRAMES as f64;
         bytes_of_frame = bytes_of_frame.max(bytes as usize);
-        tell(label, started.elapsed(), bytes, count, host.report().waits_us[from..].to_vec());
+        let took = started.elapsed();
+        let waits = host.report().waits.since(&waits);
+        tell(label, took, bytes, (display_count, count), [0.5, 0.99].map(|part| waits.quantile(part)));
     }
     host.frame(&graph, true);
-    println!("left behind: {}, disagreed: {}", host.report().dropped.len(), host.report().disagreed);
+    println!("left behind: {}, disagreed: {}", host.report().dropped, host.report().disagreed);
     drop(host);
     for mut child in displays {
         child.wait()?;
     }
-    raw(bytes_of_frame)
+    raw(bytes_of_frame, display_count)
 }
 
-fn raw(bytes: usize) -> Result<(), Failure> {
+fn raw(bytes: usize, display_count: usize) -> Result<(), Failure> {
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let address = listener.local_addr()?.to_string();
     let mut children = Vec::new();
     let mut streams = Vec::new();
-    for _ in 0..DISPLAYS {
+    for _ in 0..display_count {
         children.push(again(&["--raw", &address])?);
         let (stream, _) = listener.accept()?;
         stream.set_nodelay(true)?;
         streams.push(stream);
     }
     let packet = [&(bytes as u64).to_le_bytes()[..], &vec![7; bytes]].concat();
-    let mut waits_us = Vec::new();
+    let mut waits = Vec::new();
     let started = Instant::now();
     for _ in 0..FRAMES {
         let sent = Instant::now();
@@ -199,9 +201,12 @@ fn raw(bytes: usize) -> Result<(), Failure> {
         for stream in &mut streams {
             stream.read_exact(&mut [0])?;
         }
-        waits_us.push(sent.elapsed().as_micros() as u32);
+        waits.push(sent.elapsed());
     }
-    tell("raw TCP, the same bytes", started.elapsed(), bytes as f64, TRANSFORMS, waits_us);
+    let took = started.elapsed();
+    waits.sort_unstable();
+    let quantiles = [waits[waits.len() / 2], waits[waits.len() * 99 / 100]];
+    tell("raw TCP, the same bytes", took, bytes as f64, (display_count, TRANSFORMS), quantiles);
     drop(streams);
     for mut child in children {
         child.wait()?;
@@ -209,16 +214,12 @@ fn raw(bytes: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-fn tell(label: &str, took: Duration, bytes: f64, transforms: usize, mut waits_us: Vec<u32>) {
-    waits_us.sort_unstable();
-    let at = |of_1000: usize| f64::from(waits_us[waits_us.len() * of_1000 / 1000]) * 1e-3;
+fn tell(label: &str, took: Duration, bytes: f64, (displays, transforms): (usize, usize), waits: [Duration; 2]) {
+    let [half, most] = waits.map(|wait| wait.as_secs_f64() * 1e3);
     let rate = FRAMES as f64 / took.as_secs_f64();
     println!(
-        "{label}: {rate:.0} frames/s, {:.0} bytes a frame, {:.0} MB/s to all, {:.2} million updates/s at each, barrier p50 {:.2} ms, p99 {:.2} ms",
-        bytes,
-        rate * bytes * DISPLAYS as f64 * 1e-6,
+        "{label}: {rate:.0} frames/s, {bytes:.0} bytes a frame, {:.0} MB/s to all, {:.2} million updates/s at each, barrier p50 {half:.2} ms, p99 {most:.2} ms",
+        rate * bytes * displays as f64 * 1e-6,
         rate * (transforms * FIELDS) as f64 * 1e-6,
-        at(500),
-        at(990)
     );
 }

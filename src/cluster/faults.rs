@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use std::collections::VecDeque;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
-use umbriel_displays::cluster::Host;
+use umbriel_displays::cluster::{Host, Waits};
 
 /// How long a fault lasts, but for kill.
 const LASTS: Duration = Duration::from_secs(1);
@@ -30,8 +30,8 @@ struct Open {
     /// Was its line given up, and how long did the new one take to come?
     was_given_up: bool,
     joined: Option<Duration>,
-    /// Frames and disagreements before it.
-    frames: usize,
+    /// Waits and disagreements before it.
+    waits: Waits,
     disagreed: u64,
 }
 
@@ -166,7 +166,7 @@ impl Random {
 fn outcome(open: &Open, host: &Host, is_back: bool) -> String {
     let Fault { kind, frame, display } = &open.fault;
     let seed = open.seed.map(|seed| format!("seed {seed}: ")).unwrap_or_default();
-    let stall_us = host.report().waits_us[open.frames..].iter().max().copied().unwrap_or(0);
+    let stall_ms = host.report().waits.since(&open.waits).longest().as_secs_f64() * 1e3;
     let took_ms = open.heals.elapsed().as_secs_f64() * 1e3;
     let back = match (is_back, open.was_out, open.joined) {
         (false, ..) => "did not come back".into(),
@@ -177,7 +177,6 @@ fn outcome(open: &Open, host: &Host, is_back: bool) -> String {
         }
     };
     let disagreed = host.report().disagreed - open.disagreed;
-    let stall_ms = f64::from(stall_us) * 1e-3;
     format!("{seed}{kind:?}@{frame}:{display}: longest stall {stall_ms:.1} ms, {back}, {disagreed} disagreed")
 }
 
@@ -209,7 +208,7 @@ fn begin(
         is_healed: false,
         was_given_up: false,
         joined: None,
-        frames: host.report().waits_us.len(),
+        waits: host.report().waits.clone(),
         disagreed: host.report().disagreed,
     })
 }

@@ -103,10 +103,10 @@ pub(super) fn summary(host: &Host) -> String {
         "frames={} bytes={} wait_p50_ms={:.2} wait_p99_ms={:.2} longest_wait_ms={:.1} dropped={} agreed={} disagreed={}",
         report.frames,
         report.bytes,
-        ms(report.wait_at(500)),
-        ms(report.wait_at(990)),
-        ms(report.longest_wait()),
-        report.dropped.len(),
+        ms(report.waits.quantile(0.5)),
+        ms(report.waits.quantile(0.99)),
+        ms(report.waits.longest()),
+        report.dropped,
         report.agreed,
         report.disagreed
     )

@@ -22,6 +22,7 @@ use super::message::{
 };
 use super::ordered::Inbox;
 use super::transport::{ClusterError, End, Security, network, open};
+use super::waits::Waits;
 
 /// How an application is reached.
 #[derive(Clone, Debug)]
@@ -43,31 +44,16 @@ pub struct HostReport {
     pub frames: u64,
     /// Bytes of packets.
     pub bytes: u64,
-    /// From publishing a frame to its release, microseconds.
-    pub waits_us: Vec<u32>,
-    /// Displays that were left behind, with the frame.
-    pub dropped: Vec<(String, u64)>,
+    /// From publishing a frame to its release.
+    pub waits: Waits,
+    /// How often a display was left behind.
+    pub dropped: u64,
     /// Displays that were ready with other values than the application's.
     pub disagreed: u64,
     /// Reports of displays that were ready and agreed.
     pub agreed: u64,
     /// Joins that were refused.
     pub refused: u64,
-}
-
-impl HostReport {
-    /// The longest wait for displays.
-    pub fn longest_wait(&self) -> Duration {
-        Duration::from_micros(self.waits_us.iter().copied().max().unwrap_or(0).into())
-    }
-
-    /// The wait that so many of 1000 frames do not exceed.
-    pub fn wait_at(&self, of_1000: usize) -> Duration {
-        let mut sorted = self.waits_us.clone();
-        sorted.sort_unstable();
-        let place = (sorted.len() * of_1000 / 1000).min(sorted.len().saturating_sub(1));
-        Duration::from_micros(sorted.get(place).copied().unwrap_or(0).into())
-    }
 }
 
 enum Arrived {
@@ -245,7 +231,7 @@ impl Host {
             self.receive(graph, Duration::from_millis(2));
             self.steps(ApplicationEvent::Tick);
         }
-        self.report.waits_us.push(published.elapsed().as_micros() as u32);
+        self.report.waits.note(published.elapsed());
     }
 
     /// Serves displays until a time; the graph must not have been written since the frame, or who joins waits for the next one.
@@ -380,7 +366,8 @@ impl Host {
             match action {
                 ApplicationAction::Release(frame, may_show) => {
                     let may_show = may_show.into_iter().map(|id| id.0).collect();
-                    let heard = self.inboxes.iter().map(|(display, inbox)| (*display, inbox.taken())).collect();
+                    let is_here = |(display, _): &(&u64, &Inbox<Event>)| self.names.contains_key(display);
+                    let heard = self.inboxes.iter().filter(is_here).map(|(display, inbox)| (*display, inbox.taken())).collect();
                     let release = Release { epoch: self.epoch, frame, may_show, heard, is_last: self.is_last };
                     if let Err(error) = self.releases.put(bytes_of(&release)).wait() {
                         tracing::warn!("the release of frame {frame} could not be sent: {error}");
@@ -393,7 +380,7 @@ impl Host {
                 ApplicationAction::Dropped(id, frame) => {
                     let name = self.names.get(&id.0).cloned().unwrap_or_else(|| "?".into());
                     tracing::warn!("display `{name}` was late for frame {frame}: the others go on without it");
-                    self.report.dropped.push((name, frame));
+                    self.report.dropped += 1;
                 }
             }
         }

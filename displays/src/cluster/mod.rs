@@ -27,6 +27,8 @@ mod proxy;
 mod rights;
 #[cfg(feature = "cluster")]
 mod transport;
+#[cfg(feature = "cluster")]
+mod waits;
 
 #[cfg(feature = "cluster")]
 pub use self::{
@@ -36,6 +38,7 @@ pub use self::{
     host::{Host, HostOptions, HostReport},
     proxy::Proxy,
     transport::{ClusterError, LEASE, Security},
+    waits::Waits,
 };
 #[cfg(feature = "cluster")]
 pub use guests::{Desk, Guest, News, Whose, Wish};

@@ -186,12 +186,14 @@ pub(super) fn open(endpoint: &str, security: &Security, end: End, lease: Duratio
         ("scouting/multicast/enabled", "false".into()),
         ("scouting/gossip/enabled", "false".into()),
         ("transport/link/tx/lease", lease.as_millis().to_string()),
-        // A try while the line is cut is given up soon, so that the next one finds it mended.
-        ("transport/unicast/open_timeout", "1000".into()),
+        // A try while the line is cut is given up before the system would repeat it, which is after a second.
+        ("transport/unicast/open_timeout", (lease.as_millis() * 6 / 10).to_string()),
+        // A frame of half a megabyte finds its buffers made already.
+        ("transport/link/rx/buffer_size", "524288".into()),
         ("transport/link/tx/queue/size/data", "16".into()),
         ("transport/link/tx/queue/congestion_control/block/wait_before_close", "200000".into()),
         ("transport/shared_memory/enabled", "false".into()),
-        ("connect/retry", "{ period_init_ms: 50, period_max_ms: 200, period_increase_factor: 2 }".into()),
+        ("connect/retry", "{ period_init_ms: 50, period_max_ms: 100, period_increase_factor: 2 }".into()),
         ("open/return_conditions", "{ connect_scouted: false, declares: false }".into()),
     ];
     match end {
