@@ -206,12 +206,12 @@ impl Renderer {
                 }
             });
             let material = self.materials.get_or_make(&d.material, hint.1, frame, || {
-                let shader = self.surface.shader_of(device, &d.material, frame, |message| problems.report(message));
+                let shader = self.surface.shaders_of(device, &d.material, frame, |message| problems.report_again(message));
                 let report = |message| problems.report(message);
                 self.material_cache.make(device, queue, &self.layouts.material, &d.material, shader, report)
             });
             if let Some(made) = self.materials.get(material) {
-                self.surface.touch(made.shader, frame);
+                self.surface.touch(made.named_shader, frame);
             }
             let deformed = match (&d.pose, self.meshes.get(mesh)) {
                 (Some(pose), Some(Some(gpu_mesh))) => {
@@ -369,7 +369,9 @@ impl Renderer {
         for batch in self.draws.batches() {
             self.meshes.touch(batch.mesh, self.frame);
             self.materials.touch(batch.material, self.frame);
-            self.surface.touch(batch.kind.shader, self.frame);
+            if let Some(made) = self.materials.get(batch.material) {
+                self.surface.touch(made.named_shader, self.frame);
+            }
             if let Some(deformed) = batch.deformed {
                 self.deformer.touch(deformed, self.frame);
             }

@@ -55,7 +55,7 @@ pub struct MapShare {
     pub side: u32,
 }
 
-/// Messages, each told once.
+/// Messages, told once each.
 #[derive(Default)]
 pub(crate) struct Problems {
     told: HashSet<String>,
@@ -65,6 +65,13 @@ pub(crate) struct Problems {
 impl Problems {
     pub(crate) fn report(&mut self, message: String) {
         if self.told.insert(message.clone()) {
+            self.untold.push(message);
+        }
+    }
+
+    /// The same for what may be mended and come back: it is told anew each time.
+    pub(crate) fn report_again(&mut self, message: String) {
+        if !self.untold.contains(&message) {
             self.untold.push(message);
         }
     }

@@ -171,9 +171,16 @@ impl Surface {
         self.pipelines.get(&(pass, kind, self.frame.of(pass, kind)))
     }
 
-    /// Number of the shader that an author wrote for a material.
-    pub(crate) fn shader_of(&mut self, device: &wgpu::Device, of: &Material, frame: u64, report: impl FnOnce(String)) -> u32 {
-        self.authors.number_of(device, of, frame, report)
+    /// Number of the shader that a material is drawn with, and of the one that its author wrote, which may be wrong.
+    pub(crate) fn shaders_of(
+        &mut self,
+        device: &wgpu::Device,
+        of: &Material,
+        frame: u64,
+        report: impl FnOnce(String),
+    ) -> [u32; 2] {
+        let named = self.authors.number_of(device, of, frame, report);
+        [if self.authors.get(named).is_some() { named } else { STANDARD }, named]
     }
 
     /// A shader is drawn with.

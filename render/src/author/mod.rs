@@ -47,6 +47,9 @@ struct Entry {
     last_used: u64,
 }
 
+/// Frames that a wrong shader outlives its last use: more than there are between two looks at what is in use.
+const KEEP_WRONG_FRAMES: u64 = 40;
+
 /// Shaders of authors, by text.
 #[derive(Default)]
 pub(crate) struct Authors {
@@ -55,7 +58,7 @@ pub(crate) struct Authors {
 }
 
 impl Authors {
-    /// The number of a material's shader; [`STANDARD`] where it has none, or a wrong one. That is told once to `report`.
+    /// The number of a material's shader; [`STANDARD`] where it has none. What is wrong with it is told to `report` as long as it is new.
     pub(crate) fn number_of(
         &mut self,
         device: &wgpu::Device,
@@ -64,21 +67,16 @@ impl Authors {
         report: impl FnOnce(String),
     ) -> u32 {
         let Some(shader) = &material.shader else { return STANDARD };
-        let params = shader.params.iter().take(MAX_PARAMS).map(|(name, value)| (name.clone(), type_of(value))).collect();
+        let params = shader.params.iter().map(|(name, value)| (name.clone(), type_of(value))).collect();
         let key = Key { source: shader.source.clone(), params };
-        if shader.params.len() > MAX_PARAMS {
-            let (name, count) = (&shader.source.name, shader.params.len());
-            report(format!("{name}: a shader takes {MAX_PARAMS} parameters, it is given {count}; the last ones are left out"));
-            return STANDARD;
-        }
         let last = &mut self.last;
         let entry = self.entries.entry(key).or_insert_with_key(|key| {
-            let author = compile(device, key).map_err(report).ok();
+            let author = within_limits(key).and_then(|()| compile(device, key)).map_err(report).ok();
             *last += 1;
             Entry { number: *last, author, last_used: frame }
         });
         entry.last_used = frame;
-        entry.author.as_ref().map_or(STANDARD, |_| entry.number)
+        entry.number
     }
 
     /// The shader of a number, if it is not [`STANDARD`].
@@ -98,11 +96,21 @@ impl Authors {
         }
     }
 
-    /// Drops what was not used for longer than any material is kept; gives the numbers.
+    /// Drops what was not used for longer than any material is kept; gives the numbers. What is wrong goes soon, so that it is told again if an
+    /// author makes the same mistake again.
     pub(crate) fn drop_unused(&mut self, frame: u64) -> Vec<u32> {
-        let old = self.entries.extract_if(|_, e| e.last_used + 2 * KEEP_FRAMES < frame);
+        let kept = |e: &Entry| if e.author.is_some() { 2 * KEEP_FRAMES } else { KEEP_WRONG_FRAMES };
+        let old = self.entries.extract_if(|_, e| e.last_used + kept(e) < frame);
         old.map(|(_, entry)| entry.number).collect()
     }
+}
+
+fn within_limits(key: &Key) -> Result<(), String> {
+    let (name, count) = (&key.source.name, key.params.len());
+    if count <= MAX_PARAMS {
+        return Ok(());
+    }
+    Err(format!("{name}: a shader takes {MAX_PARAMS} parameters, it is given {count}; its shapes are shown without it"))
 }
 
 /// Our own functions in place of an author's.

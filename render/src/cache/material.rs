@@ -15,8 +15,10 @@ pub(crate) struct GpuMaterial {
     /// The least that the material's own alpha comes to anywhere.
     pub(crate) least_alpha: f32,
     pub(crate) double_sided: bool,
-    /// Number of its shader; see [`crate::author`].
+    /// Number of the shader that it is drawn with; see [`crate::author`].
     pub(crate) shader: u32,
+    /// Number of the one that it names, which may be wrong.
+    pub(crate) named_shader: u32,
     pub(crate) needs: Needs,
     /// Keeps the pictures, which other materials may share.
     _pictures: Vec<Arc<Picture>>,
@@ -42,14 +44,14 @@ impl MaterialCache {
         Ok(MaterialCache { pictures: HashMap::new(), samplers: HashMap::new(), white })
     }
 
-    /// Sends a material with the number of its shader to the GPU. What is wrong with its pictures goes to `report`, and they stay white.
+    /// Sends a material to the GPU, with the numbers of the shaders that it is drawn with and that it names. What is wrong with its pictures goes to `report`, and they stay white.
     pub(crate) fn make(
         &mut self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         layout: &wgpu::BindGroupLayout,
         material: &Material,
-        shader: u32,
+        [shader, named_shader]: [u32; 2],
         mut report: impl FnMut(String),
     ) -> GpuMaterial {
         let slots = [
@@ -101,6 +103,7 @@ impl MaterialCache {
             least_alpha: least_alpha(material),
             double_sided: material.double_sided,
             shader,
+            named_shader,
             needs,
             _pictures: bound.into_iter().map(|b| b.0).collect(),
         }

@@ -174,7 +174,7 @@ fn each_function_is_asked() {
     }
 }
 
-/// A wrong shader is told once, and its shape looks as if it had none. One that is mended is used.
+/// A wrong shader is told once, and its shape looks as if it had none. One that is mended is used, and the same mistake is told again.
 #[test]
 fn a_wrong_shader_costs_itself() {
     let mut stage = Stage::new();
@@ -187,6 +187,17 @@ fn a_wrong_shader_costs_itself() {
     assert_eq!(stage.drawn(&wrong).problems, Vec::<String>::new(), "told once");
     let mended = scene(Material { shader: shader(BY_SHADOW, &[]), ..matt(0.5, 0.5, 0.5) }, ShadowMethod::Map);
     assert_colour(dark_and_lit(&stage.drawn(&mended))[0], [0.0, 0.0, 1.0], "mended");
+    for _ in 0..70 {
+        assert_eq!(stage.drawn(&mended).problems, Vec::<String>::new(), "mended");
+    }
+    let again = scene(Material { shader: shader("fn shade() {", &[]), ..matt(0.5, 0.5, 0.5) }, ShadowMethod::Map);
+    assert_eq!(stage.drawn(&again).problems, first.problems, "the same mistake again");
+    for _ in 0..70 {
+        assert_eq!(stage.drawn(&again).problems, Vec::<String>::new(), "told once as long as it is drawn");
+    }
+    // Other numbers for the same text are no news.
+    let other = scene(Material { shader: shader("fn shade() {", &[]), ..matt(0.4, 0.5, 0.5) }, ShadowMethod::Map);
+    assert_eq!(stage.drawn(&other).problems, Vec::<String>::new(), "the same text");
     let given: Vec<_> = ["a"; 17].iter().map(|name| (*name, ShaderParam::Scalar(1.0))).collect();
     let many = scene(Material { shader: shader(BY_SHADOW, &given), ..matt(0.5, 0.5, 0.5) }, ShadowMethod::Map);
     let many = stage.drawn(&many);
