@@ -1,6 +1,7 @@
 //! Triangles and edges of meshes on the GPU, kept as long as their mesh lives.
 
 use super::parts::{self, Part};
+use glam::Vec3;
 use std::collections::HashMap;
 use std::sync::{Arc, Weak};
 use umbriel_scene::Mesh;
@@ -13,8 +14,10 @@ pub(crate) struct GpuPart {
     pub(super) layers: u32,
     /// Are there surfaces that cast as they are wound, and such that cast turned over, before a matrix mirrors them?
     pub(super) windings: [bool; 2],
-    /// As in [`Part::is_convex`].
-    pub(super) is_convex: bool,
+    /// Triangles of convex solids, which are in neither.
+    pub(super) solid_count: u32,
+    /// As in [`Part::sheet`].
+    pub(super) sheet: Option<[Vec3; 3]>,
     /// Most triangles at one edge.
     pub(super) widest_edge: u32,
     pub(crate) triangles: wgpu::Buffer,
@@ -91,7 +94,8 @@ impl GpuPart {
         let has = |winding: u32| part.triangles.iter().any(|t| t[3] == 0 || t[3] == winding);
         let edge_of: Vec<u32> = (0u32..).zip(&part.edges).flat_map(|(i, e)| std::iter::repeat_n(i, e[3] as usize)).collect();
         GpuPart {
-            is_convex: part.is_convex,
+            solid_count: part.triangles.iter().filter(|t| t[3] == parts::SOLID).count() as u32,
+            sheet: part.sheet,
             windings: [has(1), has(2)],
             widest_edge: part.edges.iter().map(|e| e[3]).max().unwrap_or(0),
             edge_of: buffer("volume edges of incidences", bytemuck::cast_slice(&edge_of)),

@@ -13,7 +13,7 @@
 //!
 //! Caps. A near cap lies on the caster's own surface. It is never in front of what is seen if the surface itself was
 //! drawn into depth, so z-pass leaves it out there. Of surfaces drawn from their front alone this holds for convex solids:
-//! a ray that meets one from behind came in through its front. A far cap at infinity is in front of nothing; z-pass needs none, and
+//! a ray that meets one from behind came in through its front. It holds for a plane sheet seen from before it, too. A far cap at infinity is in front of nothing; z-pass needs none, and
 //! under parallel light all of it is one point, so z-fail needs none either. A far cap short of infinity can be between N
 //! and P, unless a plane has N and every receiver on one side and the cap on the other ([`Reach::behind`]). Sides and
 //! caps outside of the frustum cover no pixel.
@@ -33,6 +33,7 @@ pub struct Sight {
     ahead: DVec4,
     clip_from_world: DMat4,
     near_rectangle: [DVec4; 4],
+    pub(super) eye: DVec3,
     size: [u32; 2],
     /// Left and top of the view in its target.
     pub(super) origin: [u32; 2],
@@ -63,8 +64,8 @@ pub(super) struct Watch<'a> {
 pub(super) struct Choice {
     pub(super) z_fail: bool,
     pub(super) near_caps: bool,
-    /// Near caps of convex solids are left out.
-    pub(super) convex_hides: bool,
+    /// The surface is drawn from its front, wherever it is seen from there: near caps that it hides are left out.
+    pub(super) front_hides: bool,
     pub(super) far_caps: bool,
     pub(super) scissor: Scissor,
 }
@@ -84,6 +85,7 @@ impl Sight {
             clip_from_world,
             near_rectangle: [(f.left, f.bottom), (f.right, f.bottom), (f.right, f.top), (f.left, f.top)]
                 .map(|(x, y)| near_corner(x, y)),
+            eye: world_from_view.w_axis.truncate(),
             size: view.size,
             origin: [0, 0],
             receivers,
@@ -173,7 +175,7 @@ impl<'a> Watch<'a> {
     /// How a caster with these bounds is counted; `None` where the view shows nothing of its shadow.
     pub(super) fn choose(&self, bounds: &Aabb, surface: Surface, reach: &Reach) -> Option<Choice> {
         let sight = self.sight;
-        let all = Choice { z_fail: true, near_caps: true, convex_hides: false, far_caps: true, scissor: self.scissor? };
+        let all = Choice { z_fail: true, near_caps: true, front_hides: false, far_caps: true, scissor: self.scissor? };
         if bounds.is_empty() {
             return Some(all);
         }
@@ -197,7 +199,7 @@ impl<'a> Watch<'a> {
         if is_safe {
             let is_in_front = |plane: DVec4| sight.near_rectangle.iter().all(|n| plane.dot(*n) > 0.0);
             choice.near_caps = surface != Surface::BothSides;
-            choice.convex_hides = surface == Surface::Front;
+            choice.front_hides = surface == Surface::Front;
             choice.far_caps &= reach.has_end() && !reach.behind.is_some_and(is_in_front);
         }
         if !culls {

@@ -143,6 +143,7 @@ impl Drawing {
                         Some(Piece::Sides) => (&self.quads, "side"),
                         Some(Piece::NearCaps) => (&self.quads, "near_cap"),
                         Some(Piece::TurnedCaps) => (&self.quads, "turned_cap"),
+                        Some(Piece::SolidCaps) => (&self.quads, "solid_cap"),
                         Some(Piece::FarCaps) => (&self.quads, "far_cap"),
                     };
                     let made = pipeline(device, &self.target, program, entry, in_front(self.target.depth), stencil);
@@ -187,8 +188,9 @@ impl Drawing {
         for (place, (lists, choice)) in shown.iter().enumerate() {
             let wanted = |piece| match piece {
                 Piece::Sides => true,
+                Piece::SolidCaps => choice.near_caps && lists.has(piece) && !choice.front_hides,
                 Piece::NearCaps | Piece::TurnedCaps => {
-                    choice.near_caps && lists.has(piece) && !(choice.convex_hides && lists.part.is_convex)
+                    choice.near_caps && lists.has(piece) && !(choice.front_hides && lists.hides_caps_from(sight.eye))
                 }
                 Piece::FarCaps => choice.far_caps,
             };

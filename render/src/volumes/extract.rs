@@ -5,7 +5,7 @@ use super::VolumeLight;
 use super::cache::{GpuPart, largest_buffer};
 use super::draw::Layouts;
 use bytemuck::{Pod, Zeroable};
-use glam::{Mat4, Vec4};
+use glam::{DVec3, Mat4, Vec4};
 use std::sync::Arc;
 use umbriel_scene::{Aabb, Silhouettes};
 use wgpu::util::DeviceExt;
@@ -80,11 +80,13 @@ pub(super) enum Piece {
     NearCaps,
     /// Near caps whose order of vertices is turned over.
     TurnedCaps,
+    /// Near caps of convex solids that are not mirrored.
+    SolidCaps,
     FarCaps,
 }
 
 impl Piece {
-    pub(super) const ALL: [Piece; 4] = [Piece::Sides, Piece::NearCaps, Piece::TurnedCaps, Piece::FarCaps];
+    pub(super) const ALL: [Piece; 5] = [Piece::Sides, Piece::NearCaps, Piece::TurnedCaps, Piece::SolidCaps, Piece::FarCaps];
 
     /// Place of the draw's arguments in [`Listed::draws`], bytes.
     pub(super) fn offset(self) -> u64 {
@@ -93,7 +95,7 @@ impl Piece {
 }
 
 const DRAW_SIZE: u64 = size_of::<Draw>() as u64;
-const DRAWS_SIZE: u64 = 4 * DRAW_SIZE;
+const DRAWS_SIZE: u64 = Piece::ALL.len() as u64 * DRAW_SIZE;
 
 /// Everything that decides what the lists hold.
 #[derive(Clone)]
@@ -181,14 +183,31 @@ impl Lists {
     /// Whether near caps in the order of their vertices, and turned ones, can be among them: of closed surfaces only one
     /// side casts.
     pub(super) fn has(&self, piece: Piece) -> bool {
-        let is_turned = match piece {
-            Piece::NearCaps => false,
-            Piece::TurnedCaps => true,
-            Piece::Sides | Piece::FarCaps => return true,
-        };
         let flags = self.content.flags;
         let is_mirrored = flags & MIRRORED != 0;
+        let has_solids = self.part.solid_count > 0;
+        let is_turned = match piece {
+            Piece::NearCaps => false,
+            Piece::TurnedCaps if is_mirrored && has_solids => return true,
+            Piece::TurnedCaps => true,
+            Piece::SolidCaps => return has_solids && (!is_mirrored || flags & EVERY_TRIANGLE != 0),
+            Piece::Sides | Piece::FarCaps => return true,
+        };
         flags & EVERY_TRIANGLE != 0 || self.part.windings[usize::from(is_turned != is_mirrored)]
+    }
+
+    /// Are all near caps hidden from an eye by the surface that they lie on, where that is drawn from its front alone? Convex
+    /// solids hide them from outside, and a sheet hides its own from before it.
+    pub(super) fn hides_caps_from(&self, eye: DVec3) -> bool {
+        if self.part.solid_count == self.part.triangle_count {
+            return true;
+        }
+        let Some(sheet) = self.part.sheet else { return false };
+        let world_from_object = self.content.world_from_object.as_dmat4();
+        let [a, b, c] = sheet.map(|p| world_from_object.transform_point3(p.as_dvec3()));
+        let front = if self.content.flags & MIRRORED != 0 { -1.0 } else { 1.0 };
+        let height = front * (b - a).cross(c - a).normalize_or_zero().dot(eye - a);
+        height > 1e-3 + 1e-5 * (eye.abs().max_element() + a.abs().max_element())
     }
 }
 
@@ -394,22 +413,28 @@ fn start_anew(device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder, stale: 
 struct Capacity {
     sides: u32,
     caps: u32,
+    solid_caps: u32,
 }
 
 impl Capacity {
     /// Every side of every triangle may stand alone, as two triangles; near and far caps are as many as triangles.
     fn new(part: &GpuPart) -> Capacity {
-        Capacity { sides: part.triangle_count.saturating_mul(3 * 6), caps: part.triangle_count.saturating_mul(3) }
+        let [triangles, solid] = [part.triangle_count, part.solid_count];
+        Capacity {
+            sides: triangles.saturating_mul(3 * 6),
+            caps: triangles.saturating_mul(3),
+            solid_caps: solid.saturating_mul(3),
+        }
     }
 
     fn bytes(&self) -> u64 {
-        4 * (u64::from(self.sides) + 2 * u64::from(self.caps))
+        4 * (u64::from(self.sides) + 2 * u64::from(self.caps) + u64::from(self.solid_caps))
     }
 
     /// Turned caps grow downwards from the end of the near caps.
-    fn empty_draws(&self) -> [Draw; 4] {
+    fn empty_draws(&self) -> [Draw; Piece::ALL.len()] {
         let end_of_caps = self.sides.saturating_add(self.caps);
-        let first = [0, self.sides, end_of_caps, end_of_caps];
+        let first = [0, self.sides, end_of_caps, end_of_caps, end_of_caps.saturating_add(self.solid_caps)];
         first.map(|first_index| Draw { instance_count: 1, first_index, ..Draw::default() })
     }
 }

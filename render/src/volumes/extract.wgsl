@@ -14,6 +14,7 @@ struct Draws {
     sides: Draw,
     caps: Draw,
     turned_caps: Draw,
+    solid_caps: Draw,
     far_caps: Draw,
 };
 
@@ -46,7 +47,10 @@ fn turn_triangles(
     }
     // Near caps keep the order of their vertices, so that their depth is the surface's to the last bit; turned ones are
     // drawn with the stencil operations exchanged, and grow from the end of the list.
-    if c > 0 {
+    if c > 0 && t.w == SOLID {
+        let first = atomicLoad(&draws.solid_caps.first_index);
+        put(first + atomicAdd(&draws.solid_caps.index_count, 3u), 2u * t.x, 2u * t.y, 2u * t.z);
+    } else if c > 0 {
         let first = atomicLoad(&draws.caps.first_index);
         put(first + atomicAdd(&draws.caps.index_count, 3u), 2u * t.x, 2u * t.y, 2u * t.z);
     } else {
@@ -87,11 +91,13 @@ fn raise_edges(
     let is_pointed = (caster.flags & POINTED) != 0u;
     var at = atomicAdd(&draws.sides.index_count, select(6u, 3u, is_pointed) * times);
     for (var k = 0u; k < times; k++) {
-        put(at, p, q, q + 1u);
         if is_pointed {
+            // All vertices are thrown to the same point, so that one index serves all.
+            put(at, p, q, 1u);
             at += 3u;
             continue;
         }
+        put(at, p, q, q + 1u);
         put(at + 3u, p, q + 1u, p + 1u);
         at += 6u;
     }

@@ -1,7 +1,8 @@
 //! What of a mesh casts: connected surfaces, how they are wound, and how many layers of shadow they may put over a point.
 
 use super::layers::{self, Deep};
-use umbriel_scene::{Edges, Mesh};
+use glam::Vec3;
+use umbriel_scene::{Edge, Edges, Mesh};
 
 /// Layers that one stencil group may hold where the eighth bit keeps what groups before it shadowed.
 pub(super) const GROUP_LAYERS: u32 = 127;
@@ -17,7 +18,8 @@ const BENT_SURFACE_LAYERS: u32 = 8;
 /// Surfaces of a mesh that are cast together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Part {
-    /// Three vertices, and 1 where the closed surface is wound outward, 2 inward, 0 where it is open or inconsistent.
+    /// Three vertices, and 1 where the closed surface is wound outward, 2 inward, 0 where it is open or inconsistent,
+    /// [`SOLID`] where it belongs to a convex solid wound outward, other solids that share its edges set aside.
     pub(super) triangles: Vec<[u32; 4]>,
     /// Vertices a and b, first and number of the incidences.
     pub(super) edges: Vec<[u32; 4]>,
@@ -25,9 +27,12 @@ pub(super) struct Part {
     pub(super) incidences: Vec<u32>,
     /// Layers it may put over a point.
     pub(super) layers: u32,
-    /// Every surface is a convex solid wound outward.
-    pub(super) is_convex: bool,
+    /// All triangles lie in one plane and show the same side: three of its points, as they are wound.
+    pub(super) sheet: Option<[Vec3; 3]>,
 }
+
+/// Of a triangle of a convex solid, wound outward.
+pub(super) const SOLID: u32 = 3;
 
 impl Part {
     /// Size of its longest list, bytes.
@@ -43,19 +48,22 @@ impl Part {
 pub(super) fn parts(mesh: &Mesh) -> Vec<Part> {
     let edges = Edges::of_mesh(mesh);
     let triangle = |t: u32| [0, 1, 2].map(|i| mesh.indices[3 * t as usize + i]);
-    let (surface_of, count) = connected(mesh.triangle_count(), &edges);
+    let (surface_of, count) = connected(mesh.triangle_count(), &edges, |_| true);
     let surfaces = surfaces(mesh, &edges, &surface_of, count);
     let (cut_of, cuts) = cut(mesh, &surface_of, surfaces);
     let (part_of, layers) = distribute(cuts.iter().map(|s| s.layers));
-    let mut parts: Vec<Part> = layers.iter().map(|&layers| Part { layers, is_convex: true, ..Part::default() }).collect();
+    let solids = solids(mesh, &edges);
+    let mut parts: Vec<Part> = layers.iter().map(|&layers| Part { layers, ..Part::default() }).collect();
     let mut place = vec![0; cut_of.len()];
     let part_of = |t: u32| part_of[cut_of[t as usize] as usize];
     for (t, &cut) in (0u32..).zip(&cut_of).filter(|(_, s)| **s != NONE) {
         let part = &mut parts[part_of(t)];
         place[t as usize] = part.triangles.len() as u32;
         let [a, b, c] = triangle(t);
-        part.triangles.push([a, b, c, cuts[cut as usize].winding]);
-        part.is_convex &= cuts[cut as usize].is_convex;
+        part.triangles.push([a, b, c, if solids[t as usize] { SOLID } else { cuts[cut as usize].winding }]);
+    }
+    for part in &mut parts {
+        part.sheet = sheet(mesh, &part.triangles);
     }
     let mut sorted = Vec::new();
     for edge in &edges.edges {
@@ -89,7 +97,7 @@ fn cut(mesh: &Mesh, surface_of: &[u32], surfaces: Vec<Surface>) -> (Vec<u32>, Ve
             if run != u32::MAX && run > GROUP_LAYERS {
                 deep.push(Deep { surface: cuts.len() as u32, is_closed: surface.winding != 0 });
             }
-            cuts.push(Surface { layers: surface.layers.min(run), is_convex: surface.is_convex && run == u32::MAX, ..*surface });
+            cuts.push(Surface { layers: surface.layers.min(run), ..*surface });
         }
     }
     let cut_of: Vec<u32> = surface_of
@@ -121,12 +129,20 @@ struct Surface {
     winding: u32,
     /// As in [`Part::layers`].
     layers: u32,
-    /// A convex solid wound outward.
+}
+
+/// What is known of the form of a surface.
+#[derive(Clone, Copy)]
+struct Form {
+    faces: u32,
+    /// As in [`Part::triangles`].
+    winding: u32,
+    /// A solid without dents.
     is_convex: bool,
 }
 
-/// The surface of each triangle, in the order of their first triangles, and their number.
-fn connected(triangle_count: usize, edges: &Edges) -> (Vec<u32>, usize) {
+/// The surface of each triangle, in the order of their first triangles, and their number. Edges that are `crossed` connect.
+fn connected(triangle_count: usize, edges: &Edges, crossed: impl Fn(&Edge) -> bool) -> (Vec<u32>, usize) {
     let mut parent = vec![NONE; triangle_count];
     fn root(parent: &mut [u32], mut i: u32) -> u32 {
         if parent[i as usize] == NONE {
@@ -142,7 +158,9 @@ fn connected(triangle_count: usize, edges: &Edges) -> (Vec<u32>, usize) {
         let first = root(&mut parent, edges.incidences[edge.first as usize] >> 1);
         for (t, _) in edges.triangles(edge).skip(1) {
             let other = root(&mut parent, t);
-            parent[other as usize] = first;
+            if crossed(edge) {
+                parent[other as usize] = first;
+            }
         }
     }
     let mut number = vec![NONE; triangle_count];
@@ -161,14 +179,56 @@ fn connected(triangle_count: usize, edges: &Edges) -> (Vec<u32>, usize) {
     (of.collect(), next as usize)
 }
 
-/// Finds out which surfaces are closed, how these are wound, and which are convex.
+/// Which triangles belong to convex solids wound outward. Where more than two triangles meet at an edge, several solids may.
+fn solids(mesh: &Mesh, edges: &Edges) -> Vec<bool> {
+    let (solid_of, count) = connected(mesh.triangle_count(), edges, |edge| edge.count == 2);
+    let forms = forms(mesh, edges, &solid_of, count);
+    let is_solid = |solid: &u32| *solid != NONE && forms[*solid as usize].is_convex && forms[*solid as usize].winding == 1;
+    solid_of.iter().map(is_solid).collect()
+}
+
+/// Three points of the plane in which all triangles lie, if they show the same side.
+fn sheet(mesh: &Mesh, triangles: &[[u32; 4]]) -> Option<[Vec3; 3]> {
+    let corners = |t: &[u32; 4]| [t[0], t[1], t[2]].map(|i| mesh.positions[i as usize]);
+    let normal = |[a, b, c]: [Vec3; 3]| (b - a).as_dvec3().cross((c - a).as_dvec3());
+    let first = corners(triangles.first()?);
+    let n = normal(first).normalize_or_zero();
+    let origin = first[0].as_dvec3();
+    let is_in_plane = |t: &[u32; 4]| {
+        let corners = corners(t);
+        normal(corners).dot(n) > 0.0 && corners.iter().all(|p| n.dot(p.as_dvec3() - origin) == 0.0)
+    };
+    triangles.iter().all(is_in_plane).then_some(first)
+}
+
+/// Finds out which surfaces are closed, how these are wound, and how many layers they may put over a point.
 fn surfaces(mesh: &Mesh, edges: &Edges, surface_of: &[u32], count: usize) -> Vec<Surface> {
+    let forms = forms(mesh, edges, surface_of, count);
+    let of = |form: &Form| Surface {
+        winding: form.winding,
+        layers: if form.is_convex { 1 } else { form.faces.min(BENT_SURFACE_LAYERS) },
+    };
+    let mut surfaces: Vec<Surface> = forms.iter().map(of).collect();
+    let deep = (0u32..)
+        .zip(surfaces.iter().zip(&forms))
+        .filter(|(_, (surface, form))| surface.layers > 1 && form.faces > DEEP_SURFACE_FACES);
+    let deep: Vec<Deep> = deep.map(|(i, (surface, _))| Deep { surface: i, is_closed: surface.winding != 0 }).collect();
+    if !deep.is_empty() {
+        for (deep, layers) in deep.iter().zip(layers::counted(mesh, surface_of, &deep)) {
+            let surface = &mut surfaces[deep.surface as usize];
+            surface.layers = surface.layers.max(layers);
+        }
+    }
+    surfaces
+}
+
+/// Finds out which surfaces are closed, how these are wound, and which are convex.
+fn forms(mesh: &Mesh, edges: &Edges, surface_of: &[u32], count: usize) -> Vec<Form> {
     #[derive(Clone, Copy, Default)]
     struct Sums {
         faces: u32,
         open: bool,
         bent: bool,
-        // Vertices and edges counted twice where surfaces touch only make the bound of layers wider.
         euler: i64,
         volume: f64,
         volume_scale: f64,
@@ -187,52 +247,50 @@ fn surfaces(mesh: &Mesh, edges: &Edges, surface_of: &[u32], count: usize) -> Vec
         s.faces += 1;
         s.euler += 1;
     }
-    let mut seen = vec![NONE; mesh.positions.len()];
+    let mut meeting: Vec<(u32, u32, i32)> = Vec::new();
     for edge in &edges.edges {
-        let incidences: Vec<(u32, i32)> = edges.triangles(edge).take(3).collect();
-        let surface = surface_of[incidences[0].0 as usize];
-        let s = &mut sums[surface as usize];
-        s.euler -= 1;
-        for i in [edge.a, edge.b] {
-            if std::mem::replace(&mut seen[i as usize], surface) != surface {
-                s.euler += 1;
+        meeting.clear();
+        meeting.extend(edges.triangles(edge).map(|(t, sign)| (surface_of[t as usize], t, sign)));
+        meeting.sort_unstable();
+        for of_surface in meeting.chunk_by(|a, b| a.0 == b.0) {
+            let s = &mut sums[of_surface[0].0 as usize];
+            s.euler -= 1;
+            match of_surface[..] {
+                [(_, one, sign), (_, other, against)] if sign != against => {
+                    let [p, q, r] = triangle(one).map(at);
+                    let n = (q - p).cross(r - p) * s.volume.signum();
+                    s.bent |= triangle(other).iter().any(|&i| n.dot(at(i) - p) > 1e-6 * n.length() * (at(i) - p).length());
+                }
+                _ => s.open = true,
             }
-        }
-        match incidences[..] {
-            [(one, sign), (other, against)] if sign != against => {
-                let [p, q, r] = triangle(one).map(at);
-                let n = (q - p).cross(r - p) * s.volume.signum();
-                s.bent |= triangle(other).iter().any(|&i| n.dot(at(i) - p) > 1e-6 * n.length() * (at(i) - p).length());
-            }
-            _ => s.open = true,
         }
     }
-    let finish = |s: Sums| {
+    // What turns around itself more than once has no dent either, but not the Euler number of a ball.
+    let may_be_convex = |surface: u32| !sums[surface as usize].open && !sums[surface as usize].bent;
+    let mut vertices: Vec<(u32, u32)> = Vec::new();
+    for edge in &edges.edges {
+        for (t, _) in edges.triangles(edge) {
+            let surface = surface_of[t as usize];
+            if may_be_convex(surface) {
+                vertices.extend([(surface, edge.a), (surface, edge.b)]);
+            }
+        }
+    }
+    vertices.sort_unstable();
+    vertices.dedup();
+    for (surface, _) in vertices {
+        sums[surface as usize].euler += 1;
+    }
+    let form = |s: &Sums| {
         let solid = !s.open && s.volume.abs() > 1e-6 * s.volume_scale;
-        let convex = solid && !s.bent && s.euler == 2;
-        Surface {
-            winding: if !solid {
-                0
-            } else if s.volume > 0.0 {
-                1
-            } else {
-                2
-            },
-            layers: if convex { 1 } else { s.faces.min(BENT_SURFACE_LAYERS) },
-            is_convex: convex && s.volume > 0.0,
-        }
+        let winding = match solid {
+            false => 0,
+            true if s.volume > 0.0 => 1,
+            true => 2,
+        };
+        Form { faces: s.faces, winding, is_convex: solid && !s.bent && s.euler == 2 }
     };
-    let mut surfaces: Vec<Surface> = sums.iter().copied().map(finish).collect();
-    let deep =
-        (0u32..).zip(surfaces.iter().zip(&sums)).filter(|(_, (surface, s))| surface.layers > 1 && s.faces > DEEP_SURFACE_FACES);
-    let deep: Vec<Deep> = deep.map(|(i, (surface, _))| Deep { surface: i, is_closed: surface.winding != 0 }).collect();
-    if !deep.is_empty() {
-        for (deep, layers) in deep.iter().zip(layers::counted(mesh, surface_of, &deep)) {
-            let surface = &mut surfaces[deep.surface as usize];
-            surface.layers = surface.layers.max(layers);
-        }
-    }
-    surfaces
+    sums.iter().map(form).collect()
 }
 
 /// Part of each surface, and the layers of each part. Beyond [`MAX_PARTS`] it is one part again, with all layers.
@@ -256,7 +314,6 @@ fn distribute(layers: impl Iterator<Item = u32>) -> (Vec<usize>, Vec<u32>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
     use std::sync::Arc;
 
     const CORNERS: [[f32; 3]; 8] =
@@ -290,24 +347,43 @@ mod tests {
     }
 
     #[test]
+    fn sheets_show_one_side_in_one_plane() {
+        let at = |height: f32| [[0., 0., 0.], [1., 0., 0.], [0., 0., 1.], [1., height, 1.]].map(Vec3::from).to_vec();
+        for (name, height, indices, is_sheet) in [
+            ("flat", 0.0, [0, 2, 1, 1, 2, 3], true),
+            ("bent", 0.01, [0, 2, 1, 1, 2, 3], false),
+            ("turned over in part", 0.0, [0, 2, 1, 1, 3, 2], false),
+        ] {
+            let mesh = Mesh { positions: at(height).into(), indices: indices.to_vec().into(), ..Mesh::default() };
+            assert_eq!(parts(&mesh)[0].sheet.is_some(), is_sheet, "{name}");
+        }
+    }
+
+    #[test]
     fn surfaces_are_recognised() {
         let inward: Vec<u32> = OUTWARD.chunks(3).flat_map(|t| [t[0], t[2], t[1]]).collect();
         let mut mixed = OUTWARD;
         mixed.swap(1, 2);
         let mut dented = boxes(1, &OUTWARD);
         Arc::make_mut(&mut dented.positions)[7] = Vec3::splat(0.3);
+        let mut touching = boxes(2, &OUTWARD);
+        let beside = CORNERS.map(|c| Vec3::from(c) + Vec3::new(1.0, 1.0, 0.0));
+        touching.positions = CORNERS.map(Vec3::from).into_iter().chain(beside).collect();
+        touching.indices =
+            touching.indices.iter().map(|i| [(8, 3), (12, 7)].iter().find(|m| m.0 == *i).map_or(*i, |m| m.1)).collect();
         /// Name, mesh, triangles of each part, their winding, layers of each part.
         type Row = (&'static str, Mesh, Vec<usize>, u32, Vec<u32>);
         let rows: Vec<Row> = vec![
             ("nothing", Mesh::default(), vec![], 0, vec![]),
-            ("outward", boxes(1, &OUTWARD), vec![12], 1, vec![1]),
+            ("outward", boxes(1, &OUTWARD), vec![12], SOLID, vec![1]),
+            ("touching at an edge", touching, vec![24], SOLID, vec![8]),
             ("inward", boxes(1, &inward), vec![12], 2, vec![1]),
             ("inconsistent", boxes(1, &mixed), vec![12], 0, vec![8]),
             ("open", boxes(1, &OUTWARD[..30]), vec![10], 0, vec![8]),
             ("dented", dented, vec![12], 1, vec![8]),
             ("degenerate triangles are dropped", boxes(1, &[0, 0, 1, 0, 1, 2]), vec![1], 0, vec![1]),
-            ("many", boxes(200, &OUTWARD), vec![127 * 12, 73 * 12], 1, vec![127, 73]),
-            ("too many for one stencil", boxes(300, &OUTWARD), vec![127 * 12, 127 * 12, 46 * 12], 1, vec![127, 127, 46]),
+            ("many", boxes(200, &OUTWARD), vec![127 * 12, 73 * 12], SOLID, vec![127, 73]),
+            ("too many for one stencil", boxes(300, &OUTWARD), vec![127 * 12, 127 * 12, 46 * 12], SOLID, vec![127, 127, 46]),
             (
                 "loose leaves",
                 boxes(800, &OUTWARD[..6]),

@@ -51,7 +51,16 @@ fn corner_of(t: vec4<u32>, corner: u32) -> u32 {
 @vertex
 fn near_cap(@builtin(vertex_index) index: u32) -> Placed {
     let t = triangles[index / 3u];
-    if cast_of(t) <= 0 {
+    if t.w == SOLID || cast_of(t) <= 0 {
+        return Placed(NOWHERE);
+    }
+    return near_or_far(corner_of(t, index % 3u), false);
+}
+
+@vertex
+fn solid_cap(@builtin(vertex_index) index: u32) -> Placed {
+    let t = triangles[index / 3u];
+    if t.w != SOLID || cast_of(t) <= 0 {
         return Placed(NOWHERE);
     }
     return near_or_far(corner_of(t, index % 3u), false);

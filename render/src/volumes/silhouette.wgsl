@@ -6,6 +6,9 @@ const EVERY_TRIANGLE = 1u;
 const MIRRORED = 2u;
 const POINTED = 4u;
 
+// Of a triangle of a convex solid, wound outward.
+const SOLID = 3u;
+
 struct Caster {
     world_from_object: mat4x4<f32>,
     // w = 1: position of the light. w = 0: direction towards it.
