@@ -1,5 +1,6 @@
 //! What is drawn for each view, decided before anything is recorded.
 
+use crate::author::STANDARD;
 use crate::draws::{Draw, Draws, Found};
 use crate::lights::{Lights, falls_on};
 use crate::sheets::Sheets;
@@ -29,6 +30,9 @@ pub(crate) struct ViewPlan {
     pub(crate) base_slot: usize,
     /// Where shapes are shaded once, after depth and the first light's volumes: the view with that light among the others.
     pub(crate) lit_slot: Option<usize>,
+    /// What depth is filled by: where little but light from everywhere is to be shaded, that is done at once for all places, and
+    /// what is lit drawn over it, without a pass for what is in shadow.
+    pub(crate) first_pass: Pass,
     pub(crate) opaque: Arc<[Draw]>,
     /// Shapes with lines over their edges.
     pub(crate) contoured: Vec<(usize, Draw)>,
@@ -95,10 +99,6 @@ pub(crate) struct Frame<'a> {
 }
 
 impl ViewPlan {
-    pub(crate) fn base_pass(&self) -> Pass {
-        if self.is_visibility { Pass::Visibility } else { Pass::Base }
-    }
-
     pub(crate) fn add_pass(&self, is_soft: bool) -> Pass {
         match (self.is_visibility, is_soft) {
             (true, false) => Pass::VisibilityAdd,
@@ -219,6 +219,7 @@ pub(crate) fn plan_picture(
         // Behind the lights of the surface pass follows the first one that volumes mask.
         let shades_once =
             !is_visibility && steps.first().is_some_and(|s: &Step| s.soft.is_none() && matches!(s.then, Then::Light { .. }));
+        let has_own_shader = |d: &Draw| draws.batches()[d.batch as usize].kind.shader != STANDARD;
         plans.push(ViewPlan {
             picture: number,
             layer,
@@ -229,6 +230,12 @@ pub(crate) fn plan_picture(
             is_visibility,
             base_slot: slot_with(0, in_base),
             lit_slot: shades_once.then(|| slot_with(0, in_base + 1)),
+            first_pass: match shades_once {
+                true if in_base > 0 || opaque.iter().any(has_own_shader) => Pass::Depth,
+                true => Pass::Base,
+                false if is_visibility => Pass::Visibility,
+                false => Pass::Base,
+            },
             blend_slot: slot_with(0, frame.lights.order.len()),
             opaque,
             blended,

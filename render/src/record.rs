@@ -162,7 +162,7 @@ impl Recorder<'_> {
     /// Depth, and whatever is seen where no volume is needed for it.
     fn depth_and_base(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan) {
         pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
-        self.surfaces(pass, &view.opaque, if view.lit_slot.is_some() { Pass::Depth } else { view.base_pass() });
+        self.surfaces(pass, &view.opaque, view.first_pass);
         if !view.is_visibility {
             pass.set_pipeline(&self.screen.background);
             pass.set_bind_group(1, self.lighting, &[]);
@@ -206,12 +206,12 @@ impl Recorder<'_> {
         is_counted
     }
 
-    /// Shades what depth holds, each place once: with the counted light outside of its shadow, without it inside.
+    /// Shades what depth holds: with the counted light outside of its shadow, without it inside, unless that is done.
     fn shade_once(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, is_counted: bool) {
         let Some(lit_slot) = view.lit_slot else { return };
         pass.set_bind_group(0, self.views.group(lit_slot), &[]);
         self.surfaces(pass, &view.opaque, Pass::BaseLit);
-        if is_counted {
+        if is_counted && view.first_pass == Pass::Depth {
             pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
             self.surfaces(pass, &view.opaque, Pass::BaseInShadow);
         }

@@ -265,10 +265,13 @@ impl Renderer {
                 let shader = |d: &&Draw| self.draws.batches()[d.batch as usize].kind.shader;
                 view.shading_shadow = view.opaque.iter().filter(|d| self.surface.shades_shadow(shader(d))).copied().collect();
             }
-            let mut passes: Vec<(Pass, &[Draw])> = vec![(Pass::Blend, &view.blended)];
-            let shaded =
-                if view.lit_slot.is_some() { &[Pass::Depth, Pass::BaseLit, Pass::BaseInShadow][..] } else { &[view.base_pass()] };
-            passes.extend(shaded.iter().map(|pass| (*pass, &*view.opaque)));
+            let mut passes: Vec<(Pass, &[Draw])> = vec![(Pass::Blend, &view.blended), (view.first_pass, &view.opaque)];
+            if view.lit_slot.is_some() {
+                passes.push((Pass::BaseLit, &view.opaque));
+            }
+            if view.first_pass == Pass::Depth {
+                passes.push((Pass::BaseInShadow, &view.opaque));
+            }
             if !view.steps.is_empty() {
                 passes.push((Pass::AddInShadow, &view.shading_shadow));
                 passes.extend(view.steps.iter().map(|step| (Pass::Exempt, &*step.exempt)));
