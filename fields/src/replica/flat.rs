@@ -161,6 +161,9 @@ fn scatter<T: Flat<COUNT>, const COUNT: usize>(
             let mut rows = rows.ok_or_else(|| damaged(format!("it writes a {} where none is", T::TYPE)))?;
             let values = &bytes[..bytes.len().min(4 * COUNT * left)];
             let (done, share) = target.write(&mut rows, (slot, run.step), index, values);
+            if done == 0 {
+                return Err(damaged("it has more places than values"));
+            }
             added = added.wrapping_add(share);
             left -= done;
             slot = slot.wrapping_add(run.step.wrapping_mul(done as u32));
