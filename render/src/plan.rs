@@ -96,6 +96,8 @@ pub(crate) struct Frame<'a> {
     pub(crate) soft: &'a [Option<SoftJob>],
     /// Shapes with lines over their edges, ascending.
     pub(crate) contours: &'a [usize],
+    /// Depth bounds cost processors time to find. They gain it back where these draw as well.
+    pub(crate) bounds_depth: bool,
 }
 
 impl ViewPlan {
@@ -208,7 +210,10 @@ pub(crate) fn plan_picture(
         let volumes_matter = !steps.is_empty();
         let seen = opaque.iter().filter(|_| volumes_matter).flat_map(|d| draws.visible.of(d)).map(|i| *i as usize);
         let mut sight = Sight::new(view, jobs::receivers(seen.clone(), frame.scene)).at(origin);
-        if volumes_matter && let Some(surfaces) = jobs::seen(seen, frame.scene, &view.view_from_world) {
+        if volumes_matter
+            && frame.bounds_depth
+            && let Some(surfaces) = jobs::seen(seen, frame.scene, &view.view_from_world)
+        {
             sight = sight.with(surfaces);
         }
         let in_base = match shown {

@@ -146,6 +146,7 @@ impl Renderer {
             purposes: &purposes,
             soft: &soft,
             contours: &contours,
+            bounds_depth: self.gpu.info.device_type == wgpu::DeviceType::Cpu,
         };
         let (plans, sheets) = self.plan_views(pictures, &frame, &mut stats);
         self.maps.prepare(&self.gpu.device, &mut self.views, &mut self.draws);

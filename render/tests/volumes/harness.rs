@@ -167,7 +167,7 @@ impl Gpu {
         let mut view_data = [0f32; 132];
         let clip_from_view = match self.depth {
             Depth::Reversed => view.frustum.clip_from_view(),
-            Depth::Conventional => view.frustum.clip_from_view_conventional((-22f32).exp2()),
+            Depth::Conventional => view.frustum.clip_from_view_conventional((-12f32).exp2()),
             Depth::Clamped => view.frustum.clip_from_view_conventional(0.0),
         };
         let clip_from_world: Mat4 = clip_from_view * view.view_from_world;
