@@ -32,6 +32,8 @@ pub(crate) struct Definition {
     pub(crate) evaluate: Option<Handler>,
     pub(crate) changed: Vec<(String, Handler)>,
     pub(crate) always: bool,
+    /// Its nodes stay in this application.
+    pub(crate) local: bool,
 }
 
 /// A node of a native type that behaves as a script says.
@@ -105,6 +107,9 @@ impl Stage {
         };
         let made_of = definition.native.as_deref().unwrap_or(&known.name);
         let node = Node(self.write(|graph| graph.create(made_of)).map_err(fault)?);
+        if definition.local {
+            self.write(|graph| graph.set_local(node.0, true)).map_err(fault)?;
+        }
         if definition.native.is_some() {
             self.write(|graph| dress(graph, node.0, &known.name, &definition, definition.is_evaluated(self))).map_err(fault)?;
             self.behaviours.borrow_mut().insert(node.0, Behaviour { type_name: known.name.to_string(), frame: 0 });

@@ -220,3 +220,25 @@ fn failing_behaviours_are_switched_off() {
     assert!(found.len() == 1 && found[0].contains("nothing") && found[0].contains("switched off"), "{found:?}");
     assert_eq!(at(&mut world, "[a.translation.x, b.translation.x]"), "[3.0, 0.0]");
 }
+
+/// What scripts keep from other processes: nodes of a type, native or not, one node, one field.
+#[test]
+fn some_things_stay_in_the_application() {
+    let mut world = world(
+        "define(\"Log\", #{ local: true, fields: #{ lines: 0 } });
+         define(\"Ghost\", #{ local: true, extends: \"Transform\" });
+         define(\"Lamp\", #{ fields: #{ state: 0, draft: field(0.0, #{ local: true }) } });
+         let log = make(\"Log\", #{ name: \"log\" }); let ghost = make(\"Ghost\", #{ name: \"ghost\" });
+         let lamp = make(\"Lamp\", #{ name: \"lamp\" }); let tool = make(\"Transform\", #{ name: \"tool\" }); let other = make(\"Transform\", #{ name: \"other\" });
+         keep_local(tool);",
+    );
+    world.step(0.0);
+    assert_eq!(problems(&mut world), Vec::<String>::new());
+    let graph = world.graph();
+    for (name, is_local) in [("log", true), ("ghost", true), ("lamp", false), ("tool", true), ("other", false)] {
+        assert_eq!(graph.is_local(graph.find(name).unwrap()), is_local, "{name}");
+    }
+    let lamp = graph.find("lamp").unwrap();
+    let is_local = |field: &str| graph.declaration(graph.field(lamp, field).unwrap()).unwrap().local;
+    assert_eq!([is_local("state"), is_local("draft")], [false, true]);
+}

@@ -18,7 +18,8 @@ pub(super) fn teach(words: &mut Words<'_>) {
     words.word(
         "field(value: any, about: map) -> Field",
         "The first value of a field, with what is known of the field: `doc`, `unit`, `range: [low, high]`, `type: \"f32\"`, \
-         `choices: [\"red\", \"green\"]`, `aliases: [...]`, and `event: true` where a write of the same value counts too.",
+         `choices: [\"red\", \"green\"]`, `aliases: [...]`, `event: true` where a write of the same value counts too, and `local: true` where \
+         displays in other processes need not know of it.",
         |value: Dynamic, about: Map| field(&value, &about),
     );
     words.word(
@@ -46,7 +47,7 @@ fn kind(name: &str) -> Outcome<Kind> {
     }
 }
 
-const ABOUT: [&str; 7] = ["doc", "unit", "range", "type", "choices", "aliases", "event"];
+const ABOUT: [&str; 8] = ["doc", "unit", "range", "type", "choices", "aliases", "event", "local"];
 
 fn field(value: &Dynamic, about: &Map) -> Outcome<Declared> {
     if let Some(unknown) = about.keys().find(|key| !ABOUT.contains(&key.as_str())) {
@@ -69,6 +70,9 @@ fn field(value: &Dynamic, about: &Map) -> Outcome<Declared> {
     }
     if about.get("event").is_some_and(|event| event.as_bool() == Ok(true)) {
         field = field.on_set(SetRule::Pulse);
+    }
+    if about.get("local").is_some_and(|local| local.as_bool() == Ok(true)) {
+        field = field.local();
     }
     Ok(Declared(field))
 }

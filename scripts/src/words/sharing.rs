@@ -5,11 +5,20 @@ use std::rc::Rc;
 use rhai::{Dynamic, FnPtr, NativeCallContext};
 
 use super::Words;
-use crate::error::{Outcome, fail};
+use crate::error::{Fault, Outcome, fail};
 use crate::sharing::Request;
 use crate::stage::{Handler, Node, Stage};
 
 pub(super) fn teach(words: &mut Words<'_>) {
+    let stage = words.stage.clone();
+    words.word(
+        "keep_local(node: Node)",
+        "Keeps a node in this application: displays in other processes, and other applications, learn nothing of it.",
+        move |node: Node| -> Outcome<()> {
+            stage.may_change()?;
+            Ok(stage.write(|graph| graph.set_local(node.0, true)).map_err(|e| Fault::new(e.to_string()))?)
+        },
+    );
     let stage = words.stage.clone();
     words.word(
         "lock(node: Node)",

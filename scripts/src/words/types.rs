@@ -16,7 +16,8 @@ pub(super) fn teach(words: &mut Words<'_>) {
         "define(type: string, parts: map)",
         "A node type of your own. `fields` gives names and first values; `evaluate: |me, time|` runs in each frame in which one of \
          the fields was written, or in every frame with `always: true`; `changed: #{ field: |me, value| }` runs when a field changed; \
-         `extends: \"Transform\"` begins with the fields and the behaviour of another type; `doc` says what it is.",
+         `extends: \"Transform\"` begins with the fields and the behaviour of another type; `doc` says what it is; with `local: true` its \
+         nodes stay in this application.",
         move |context: NativeCallContext<'_>, name: &str, parts: Map| define(&stage, name, &parts, context.call_position()),
     );
     let stage = words.stage.clone();
@@ -27,7 +28,7 @@ pub(super) fn teach(words: &mut Words<'_>) {
     );
 }
 
-const PARTS: [&str; 6] = ["fields", "evaluate", "changed", "always", "doc", "extends"];
+const PARTS: [&str; 7] = ["fields", "evaluate", "changed", "always", "doc", "extends", "local"];
 
 fn define(stage: &Stage, name: &str, parts: &Map, place: Position) -> Outcome<()> {
     stage.may_change()?;
@@ -40,6 +41,9 @@ fn define(stage: &Stage, name: &str, parts: &Map, place: Position) -> Outcome<()
     definition.evaluate = parts.get("evaluate").map(|f| handler("evaluate", f)).transpose()?;
     if let Some(always) = parts.get("always") {
         definition.always = always.as_bool() == Ok(true);
+    }
+    if let Some(local) = parts.get("local") {
+        definition.local = local.as_bool() == Ok(true);
     }
     let own = map_of(parts, "fields")?;
     let mut fields = base.as_ref().map(|base| base.fields.clone()).unwrap_or_default();
