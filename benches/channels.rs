@@ -6,8 +6,9 @@
 //! frame is drawn while the next is made, as in a window. Nothing is written to files. "Sailing" moves the ship, and with it the whole world past the
 //! channels, in every frame. Rows are drawn in turns.
 
-use glam::{Vec2, Vec3};
-use std::path::Path;
+mod harbour;
+
+use glam::Vec3;
 use std::time::Instant;
 use umbriel_displays::WindowSizes;
 use umbriel_displays::rig::{Rig, Wanted};
@@ -23,11 +24,7 @@ const TURNS: u32 = 5;
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> Outcome<()> {
-    let wanted = std::env::args().skip(1).find_map(|a| {
-        let (width, height) = a.split_once('x')?;
-        Some([width.parse().ok()?, height.parse().ok()?])
-    });
-    let size = wanted.unwrap_or([320, 256]);
+    let size = std::env::args().skip(1).find_map(|a| harbour::size_in(&a)).unwrap_or([320, 256]);
     let gpu = Gpu::new(None)?;
     println!("{}, harbour, seven channels of {}x{}", gpu.info.name, size[0], size[1]);
     let only: Vec<String> = std::env::args().skip(1).filter(|a| a.contains('|')).collect();
@@ -81,12 +78,8 @@ struct Bridge {
 
 impl Bridge {
     fn new(gpu: &Gpu, size: [u32; 2], samples: Samples, method: Option<ShadowMethod>, sails: bool) -> Outcome<Bridge> {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/worlds/harbour.rhai");
-        let mut world = World::load_file(&path)?;
-        world.step(0.0);
-        let graph = world.graph_mut();
-        let display = graph.find("bridge").ok_or("no bridge")?;
-        graph.set_named(display, "size", Vec2::new(size[0] as f32, size[1] as f32))?;
+        let world = harbour::open(size)?;
+        let graph = world.graph();
         let deck = graph.nodes().find(|n| &*graph.type_of(*n).name == "Navigation").ok_or("no deck")?;
         Ok(Bridge {
             world,

@@ -5,8 +5,9 @@
 //! to the first row's frame of its turn. With a software driver, time is what all threads of the process spent on processors, where
 //! the system tells: that is the frame, whatever else runs beside it. On a card it is the time until the frame is done.
 
-use glam::{Mat4, Vec2, Vec3};
-use std::path::Path;
+mod harbour;
+
+use glam::{Mat4, Vec3};
 use std::sync::Arc;
 use std::time::Instant;
 use umbriel_displays::WindowSizes;
@@ -17,7 +18,6 @@ use umbriel_scene::{
     VolumeSettings,
 };
 use umbriel_scenegraph::Extractor;
-use umbriel_scripts::World;
 
 const TURNS: usize = 15;
 
@@ -28,12 +28,8 @@ fn main() -> Outcome<()> {
     let gpu = Gpu::new(None)?;
     println!("{}", gpu.info.name);
     let args: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let size_of = |a: &String| {
-        let (width, height) = a.split_once('x')?;
-        Some([width.parse().ok()?, height.parse().ok()?])
-    };
-    let size = args.iter().find_map(size_of).unwrap_or([320, 256]);
-    let (scene, pictures) = harbour(size)?;
+    let size = args.iter().find_map(|a| harbour::size_in(a)).unwrap_or([320, 256]);
+    let (scene, pictures) = channels(size)?;
     let plain = VolumeSettings {
         counting: VolumeCounting::ZFail,
         culling: false,
@@ -61,7 +57,7 @@ fn main() -> Outcome<()> {
         ("map of 2048", with(&scene, ShadowMethod::Map, plain)),
         ("no shadows", with(&scene, ShadowMethod::None, plain)),
     ];
-    let only: Vec<&String> = args.iter().filter(|a| size_of(a).is_none()).collect();
+    let only: Vec<&String> = args.iter().filter(|a| harbour::size_in(a).is_none()).collect();
     let rows: Vec<Row> = rows.into_iter().filter(|(name, _)| only.is_empty() || only.iter().any(|o| *o == name)).collect();
     table(&gpu, &format!("harbour, seven channels of {}x{}", size[0], size[1]), rows, &pictures)?;
 
@@ -163,12 +159,8 @@ fn with(scene: &Scene, method: ShadowMethod, settings: VolumeSettings) -> Scene 
 }
 
 /// The harbour as the command shows it, with so many pixels in a channel.
-fn harbour(size: [u32; 2]) -> Outcome<(Scene, Vec<Picture>)> {
-    let mut world = World::load_file(Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/worlds/harbour.rhai"))?;
-    world.step(0.0);
-    let graph = world.graph_mut();
-    let display = graph.find("bridge").ok_or("no bridge")?;
-    graph.set_named(display, "size", Vec2::new(size[0] as f32, size[1] as f32))?;
+fn channels(size: [u32; 2]) -> Outcome<(Scene, Vec<Picture>)> {
+    let world = harbour::open(size)?;
     let (mut extractor, mut scene, mut rig) = (Extractor::new(), Scene::default(), Rig::new());
     extractor.update(world.graph(), &mut scene);
     let wanted = Wanted { view: None, size: [320, 256], windows: &WindowSizes::new() };

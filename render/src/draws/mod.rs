@@ -347,8 +347,7 @@ impl Draws {
     /// Those of [`Draws::surfaces`] that pass `wanted`.
     pub(crate) fn surfaces_where(&mut self, clip_from_world: &Mat4, wanted: impl Fn(usize) -> bool) -> Found {
         let batches = 0..self.first_blended();
-        let is_wanted = |slot: &Slot, index: u32| !slot.stands_in && wanted(index as usize);
-        self.ask(None, clip_from_world, batches, |_| Holds::Some, is_wanted)
+        self.shown_where(clip_from_world, batches, wanted)
     }
 
     fn ask(
@@ -395,14 +394,14 @@ impl Draws {
 
     /// Drawables that a view may show and that pass `wanted`, each with a draw of its own.
     pub(crate) fn single(&mut self, clip_from_world: &Mat4, wanted: impl Fn(usize) -> bool) -> Vec<(usize, Draw)> {
-        let found = self.surfaces_and_blended_where(clip_from_world, wanted);
+        let batches = 0..self.order.batches.len();
+        let found = self.shown_where(clip_from_world, batches, wanted);
         let each = |draw: Draw| (draw.first..draw.first + draw.count).map(move |first| Draw { first, count: 1, ..draw });
         let draws = found.draws.iter().copied().flat_map(each);
         draws.map(|draw| (self.visible.of(&draw)[0] as usize, draw)).collect()
     }
 
-    fn surfaces_and_blended_where(&mut self, clip_from_world: &Mat4, wanted: impl Fn(usize) -> bool) -> Found {
-        let batches = 0..self.order.batches.len();
+    fn shown_where(&mut self, clip_from_world: &Mat4, batches: Range<usize>, wanted: impl Fn(usize) -> bool) -> Found {
         let is_wanted = |slot: &Slot, index: u32| !slot.stands_in && wanted(index as usize);
         self.ask(None, clip_from_world, batches, |_| Holds::Some, is_wanted)
     }
