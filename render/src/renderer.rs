@@ -230,7 +230,8 @@ impl Renderer {
     fn choose_maps(&mut self, scene: &Scene, pictures: &[Picture]) -> Aabb {
         let casters = self.draws.casters_box();
         let any_has_holes = self.draws.any_has_holes();
-        if !(0..scene.lights.len()).any(|light| draws_map(scene, light, any_has_holes)) {
+        let lights: Vec<usize> = (0..scene.lights.len()).filter(|light| draws_map(scene, *light, any_has_holes)).collect();
+        if lights.is_empty() {
             self.maps.forget();
             return casters;
         }
@@ -238,7 +239,7 @@ impl Renderer {
         let problems = &mut self.problems;
         let revision = |d| self.deformer.get(d).map_or(0, |d| d.revision);
         let snapshots = self.draws.snapshots(&scene.drawables, revision);
-        let is_new = self.maps.choose(&self.gpu.device, scene, around, &snapshots, |message| problems.report(message));
+        let is_new = self.maps.choose(&self.gpu.device, (scene, &lights), around, &snapshots, |message| problems.report(message));
         if is_new {
             self.lighting.forget_maps();
         }

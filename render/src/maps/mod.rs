@@ -11,7 +11,7 @@ mod share;
 use crate::clock::Clock;
 use crate::draws::{Draw, Draws, Kind, Snapshot};
 use crate::layouts::Layouts;
-use crate::lights::{draws_map, maps_holes_only};
+use crate::lights::maps_holes_only;
 use crate::record::Reads;
 use crate::shaders;
 use crate::slots::Slots;
@@ -117,11 +117,11 @@ impl Maps {
         self.held.clear();
     }
 
-    /// Chooses the maps of the frame, for the lights that have some. True where the texture is a new one, which bind groups must learn.
+    /// Chooses the maps of the frame, for those `lights` of the scene that have some. True where the texture is a new one, which bind groups must learn.
     pub(crate) fn choose(
         &mut self,
         device: &wgpu::Device,
-        scene: &Scene,
+        (scene, lights): (&Scene, &[usize]),
         around: &Surroundings,
         snapshots: &[Arc<Snapshot>; 2],
         mut report: impl FnMut(String),
@@ -130,8 +130,7 @@ impl Maps {
         self.shares.clear();
         let limit = device.limits().max_texture_dimension_2d;
         let mut wanted: Vec<Wanted> = Vec::new();
-        let any_has_holes = snapshots[1].pages.iter().any(|page| !page.is_empty());
-        for index in (0..scene.lights.len()).filter(|index| draws_map(scene, *index, any_has_holes)) {
+        for &index in lights {
             let light = &ranged(&scene.lights[index], around.casters);
             let size = light.map.size.clamp(1, limit);
             if size != light.map.size {
