@@ -35,6 +35,12 @@ fn kind_converts(from: Kind, to: Kind) -> bool {
         )
 }
 
+/// Numbers, and what consists of numbers that each may be held to a range; see [`Value::outside`].
+pub(crate) fn takes_range(kind: Kind) -> bool {
+    use Kind::{Color, ColorA, Vec2, Vec3, Vec4};
+    kind != Kind::Bool && is_number(kind) || matches!(kind, Vec2 | Vec3 | Vec4 | Color | ColorA)
+}
+
 /// A number on its way: integers stay exact.
 #[derive(Clone, Copy)]
 enum Number {

@@ -117,8 +117,11 @@ impl Evaluation<'_> {
             if let Some(value) = value.convert(T::TYPE).as_ref().and_then(T::from_value) {
                 return value;
             }
+            let message = format!("`{}` is of type {}, which cannot be read as {}", field.name, field.field_type, T::TYPE);
+            self.report_field(index, message);
+        } else {
+            self.report(format!("there is no field number {index} to be read as {}", T::TYPE));
         }
-        self.report(format!("field number {index} cannot be read as {}", T::TYPE));
         T::empty()
     }
 

@@ -93,6 +93,16 @@ impl Explain {
         self.last.get(&field)
     }
 
+    /// What was written since the last frame belongs to this one, whose time was not known then.
+    pub(crate) fn frame_begins(&mut self, frame: u64, time_s: f64) {
+        for noted in self.recent.iter_mut().rev().take_while(|noted| noted.frame == frame) {
+            noted.time_s = time_s;
+            if let Some(last) = self.last.get_mut(&noted.field).filter(|last| last.id == noted.id) {
+                last.time_s = time_s;
+            }
+        }
+    }
+
     fn source(&self, field: FieldId) -> (FieldId, WriteId) {
         (field, self.last.get(&field).map_or(0, |noted| noted.id))
     }

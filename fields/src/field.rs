@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::convert::takes_range;
 use crate::naming::canonical;
 use crate::{EnumValue, FieldType, FieldValue, Kind, NodeId, Value};
 
@@ -161,6 +162,9 @@ impl Field {
             if self.choices.is_empty() {
                 return Some(format!("enum field `{name}` has no choices"));
             }
+            if let Some(at) = (1..self.choices.len()).find(|at| self.choices[..*at].contains(&self.choices[*at])) {
+                return Some(format!("enum field `{name}` has the choice `{}` twice", self.choices[at]));
+            }
             let inside = |value: &EnumValue| (value.0 as usize) < self.choices.len();
             let valid = match &self.default {
                 Value::Enum(value) => inside(value),
@@ -174,6 +178,9 @@ impl Field {
         if let Some((smallest, largest)) = self.range {
             if smallest.is_nan() || largest.is_nan() || smallest > largest {
                 return Some(format!("field `{name}` has the empty range {smallest} to {largest}"));
+            }
+            if !takes_range(self.field_type.kind) {
+                return Some(format!("field `{name}` has a range, which fields of type {} do not have", self.field_type));
             }
             if let Some(value) = self.default.outside(smallest, largest) {
                 return Some(format!("the default {value} of field `{name}` is outside of its range {smallest} to {largest}"));

@@ -86,6 +86,9 @@ impl Graph {
         }
         self.frame.time_s = time_s;
         self.frame.number += 1;
+        if let Some(explain) = &mut self.explain {
+            explain.frame_begins(self.frame.number, time_s);
+        }
         self.note(|| Event::Frame(time_s));
         let idle = self.schedule.is_idle() && self.frame.always.is_empty() && self.frame.carried.is_empty();
         if !idle {

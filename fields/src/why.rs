@@ -25,7 +25,7 @@ pub struct Cause {
     pub revision: Revision,
     /// The number of the frame, from 1 on; what is written between frames belongs to the next.
     pub frame: u64,
-    /// The time of the frame in seconds; for what was written between frames, of the one before.
+    /// The time of the frame in seconds; of the frame before, as long as the frame has not begun.
     pub time_s: f64,
     /// How it came about; the causes below, which are one deeper, are why.
     pub by: By,

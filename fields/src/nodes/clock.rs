@@ -21,7 +21,10 @@ pub(super) fn time_sensor() -> NodeType {
     NodeType::new("TimeSensor", "A clock. It reads the time of the frame, which is the same for all nodes.")
         .field(Field::new("enabled", true).doc("Runs at all."))
         .field(Field::new("cycle_interval", Time(1.0)).unit("s").doc("Length of a cycle; more than zero."))
-        .field(Field::new("loop", false).doc("Starts the next cycle at the end of a cycle."))
+        .field(
+            Field::new("loop", false)
+                .doc("Starts the next cycle at the end of a cycle; without it, the present cycle is the last."),
+        )
         .field(Field::new("start_time", Time(0.0)).unit("s").doc("When the first cycle starts."))
         .field(Field::new("stop_time", Time(0.0)).unit("s").doc("When it stops, if that is after `start_time`."))
         .field(
@@ -59,7 +62,10 @@ fn evaluate(evaluation: &mut Evaluation<'_>) {
     let elapsed_s = if is_paused { evaluation.get::<Time>(ELAPSED_TIME).0 } else { now - start - paused_s };
     let cycles = elapsed_s / interval;
     let stopped = stop > start && now >= stop;
-    let over = !evaluation.get::<bool>(LOOP) && cycles >= 1.0;
+    // A clock that no longer loops runs to the end of its cycle (X3D 4 section 8.2.4.4).
+    let seen = if was_active { evaluation.get::<Time>(ELAPSED_TIME).0 / interval } else { 0.0 };
+    let last = seen.ceil().max(1.0);
+    let over = !evaluation.get::<bool>(LOOP) && cycles >= last;
     let active = enabled && now >= start && !stopped && !over;
     if active && !is_paused {
         // A frame at the end of a cycle shows its end, not the beginning of the next (X3D 4 section 8.2.4.5).
@@ -72,7 +78,7 @@ fn evaluate(evaluation: &mut Evaluation<'_>) {
         evaluation.set(TIME, Time(now));
     } else if enabled && over && !stopped && was_active {
         evaluation.set(FRACTION_CHANGED, 1.0f32);
-        evaluation.set(ELAPSED_TIME, Time(interval));
+        evaluation.set(ELAPSED_TIME, Time(last * interval));
         evaluation.set(TIME, Time(now));
     }
     evaluation.set(PAUSED_FOR, Time(paused_s));

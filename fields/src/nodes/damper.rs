@@ -87,8 +87,10 @@ fn evaluate<V: Followed>(evaluation: &mut Evaluation<'_>) {
         (true, false) => value.items().repeat(order),
     };
     let glided = glide(&stages, goal, order, (passed_s / tau as f64) as f32);
-    let far = glided.chunks(goal.len().max(1)).flat_map(|stage| stage.iter().zip(goal));
-    let moves = far.into_iter().any(|(item, goal)| item.distance(*goal) > tolerance);
+    let pairs = glided.chunks(goal.len().max(1)).flat_map(|stage| stage.iter().zip(goal));
+    let mut away = pairs.map(|(item, goal)| item.distance(*goal));
+    // No way leads to or from infinity: there it jumps.
+    let moves = away.any(|away| away > tolerance && away < f32::INFINITY);
     if moves {
         evaluation.set(VALUE_CHANGED, V::of(&glided[(order - 1) * goal.len()..]));
         evaluation.set::<V::Items>(STAGES, glided.into());

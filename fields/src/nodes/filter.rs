@@ -58,6 +58,9 @@ where
         return;
     }
     let (now, measured): (f64, T) = (evaluation.time(), evaluation.get(SET_VALUE));
+    if !T::length(measured.minus(measured)).is_finite() {
+        return evaluation.report_field(SET_VALUE, "what is measured is not finite; it is left out");
+    }
     let passed_s = now - evaluation.get::<Time>(TIME).0;
     let first = !evaluation.written(VALUE_CHANGED);
     let measured_before: T = evaluation.get(MEASURED);

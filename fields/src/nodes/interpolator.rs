@@ -13,6 +13,7 @@ const KEY: u16 = 1;
 const KEY_VALUE: u16 = 2;
 const INTERPOLATION: u16 = 3;
 const VALUE_CHANGED: u16 = 4;
+const KEYS_FIT: u16 = 5;
 
 const LINEAR: EnumValue = EnumValue(0);
 const STEP: EnumValue = EnumValue(1);
@@ -65,6 +66,11 @@ where
         )
         .field(Field::choice("interpolation", &["linear", "step", "cubic_spline"], "linear").doc("What lies between the keys."))
         .field(Field::new("value_changed", value_changed).output().doc("The value; written from the first `set_fraction` on."))
+        .field(
+            Field::new("keys_fit", true)
+                .output()
+                .doc("Whether `key` ascends and `key_value` has as many values as it needs; nothing is computed while not."),
+        )
 }
 
 fn one<T: FieldValue + Blend>(name: &str, doc: &str) -> NodeType
@@ -133,6 +139,8 @@ where
     if new_keys {
         let values = evaluation.read::<Arc<[T]>>(KEY_VALUE)?.len();
         let fault = fault(evaluation.read::<Arc<[f32]>>(KEY)?, values, per_key, stride(mode));
+        // Kept, because to look at all keys in every frame would cost more than to compute the value.
+        evaluation.set(KEYS_FIT, fault.is_none());
         fault.into_iter().for_each(|fault| evaluation.report_field(KEY, fault));
     }
     // Without any fraction the value stays: what follows this node keeps its own place until the clock starts.
@@ -142,7 +150,9 @@ where
     let fraction: f32 = evaluation.get(SET_FRACTION);
     let (keys, values) = (evaluation.read::<Arc<[f32]>>(KEY)?, evaluation.read::<Arc<[T]>>(KEY_VALUE)?);
     let group = keys.len() * stride(mode);
-    let fits = group > 0
+    // Counted again: keys may be written silently, or come from a file.
+    let fits = *evaluation.read(KEYS_FIT)?
+        && group > 0
         && !values.is_empty()
         && values.len().is_multiple_of(group)
         && per_key.is_none_or(|per_key| values.len() == group * per_key);

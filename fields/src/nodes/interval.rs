@@ -26,9 +26,16 @@ fn evaluate(evaluation: &mut Evaluation<'_>) {
     let [value, from_min, from_max, to_min, to_max] =
         [SET_VALUE, FROM_MIN, FROM_MAX, TO_MIN, TO_MAX].map(|index| evaluation.get::<f64>(index));
     let length = from_max - from_min;
-    if length == 0.0 || !length.is_finite() {
-        if evaluation.changed(FROM_MIN) || evaluation.changed(FROM_MAX) {
-            evaluation.report_field(FROM_MAX, format!("cannot map from an interval between {from_min} and {from_max}"));
+    let fault = if length == 0.0 || !length.is_finite() {
+        Some((FROM_MAX, format!("cannot map from an interval between {from_min} and {from_max}")))
+    } else if !to_min.is_finite() || !to_max.is_finite() {
+        Some((TO_MAX, format!("cannot map to an interval between {to_min} and {to_max}")))
+    } else {
+        None
+    };
+    if let Some((field, fault)) = fault {
+        if (FROM_MIN..=TO_MAX).any(|field| evaluation.changed(field)) {
+            evaluation.report_field(field, fault);
         }
         return;
     }

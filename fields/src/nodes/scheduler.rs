@@ -50,11 +50,8 @@ fn evaluate(evaluation: &mut Evaluation<'_>) {
     let told = if is_new { 0 } else { evaluation.get(TOLD) };
     let laps = if period > 0.0 { (passed_s / period).floor() } else { 0.0 };
     let in_lap_s = passed_s - laps * period;
-    let due = if passed_s < 0.0 {
-        0
-    } else {
-        laps as i64 * times.len() as i64 + times.partition_point(|time| time.0 <= in_lap_s) as i64
-    };
+    let before = (laps as i64).saturating_mul(times.len() as i64);
+    let due = if passed_s < 0.0 { 0 } else { before.saturating_add(times.partition_point(|time| time.0 <= in_lap_s) as i64) };
     if times.is_empty() || !evaluation.get::<bool>(ENABLED) {
         return evaluation.set(TOLD, told);
     }

@@ -30,11 +30,13 @@ where
             let keys: Arc<[f32]> = evaluation.get(KEY);
             let values: Arc<[T]> = evaluation.get(KEY_VALUE);
             let new_keys = evaluation.changed(KEY) || evaluation.changed(KEY_VALUE);
-            if new_keys && let Some(fault) = fault(&keys, values.len(), Some(1), 1) {
-                evaluation.report_field(KEY, fault);
+            if let Some(fault) = fault(&keys, values.len(), Some(1), 1) {
+                if new_keys {
+                    evaluation.report_field(KEY, fault);
+                }
+                return;
             }
-            if !evaluation.written(SET_FRACTION) || !(new_keys || evaluation.changed(SET_FRACTION)) || values.len() != keys.len()
-            {
+            if !evaluation.written(SET_FRACTION) || !(new_keys || evaluation.changed(SET_FRACTION)) {
                 return;
             }
             if let Some(span) = span(&keys, evaluation.get(SET_FRACTION)) {

@@ -37,6 +37,9 @@ impl<'de> Deserialize<'de> for Block<'de> {
     }
 }
 
+/// Some editors begin a file with one.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
 /// The text and what was said about it.
 struct Reader<'a> {
     text: &'a str,
@@ -49,12 +52,12 @@ type At<'a> = (&'a str, usize);
 
 pub(super) fn read(text: &str) -> Result<Parsed<'_>, SaveError> {
     let syntax = |error: ron::error::SpannedError| {
-        let (start, fault) = (error.span.start, error.code.to_string());
+        let (start, fault) = (error.span.start, fault_of(&error.code));
         SaveError::Syntax { line: start.line, column: start.col, fault }
     };
     let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(place, _)| place + 1));
     let mut reader = Reader { text, lines: starts.collect(), parsed: Parsed::default() };
-    let Block(entries) = ron::from_str(text).map_err(syntax)?;
+    let Block(entries) = ron::from_str(text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text)).map_err(syntax)?;
     let minor = reader.check_head(&entries)?;
     reader.parsed.check_minor(minor);
     for (key, raw) in entries {
@@ -72,6 +75,14 @@ pub(super) fn read(text: &str) -> Result<Parsed<'_>, SaveError> {
         }
     }
     Ok(reader.parsed)
+}
+
+/// The words of the library, but for those that are meant for programmers.
+fn fault_of(error: &ron::Error) -> String {
+    match error {
+        ron::Error::ExceededRecursionLimit => "the values are nested too deeply".into(),
+        error => error.to_string(),
+    }
 }
 
 impl<'a> Reader<'a> {
@@ -103,6 +114,15 @@ impl<'a> Reader<'a> {
         self.parsed.report(Some(at.1), node, None, format!("nothing here is called `{key}`{nearest}; it is kept out"));
     }
 
+    /// Of two entries of one name the later one counts.
+    fn report_twice(&mut self, node: &str, entries: &[(String, At<'_>)]) {
+        for (place, (key, (_, line))) in entries.iter().enumerate() {
+            if entries[..place].iter().any(|(before, _)| before == key) {
+                self.parsed.report(Some(*line), node, None, format!("`{key}` stands here again; the last one counts"));
+            }
+        }
+    }
+
     /// Something of a known shape, or a report.
     fn read<T: DeserializeOwned>(&mut self, at: At<'a>, node: &str, what: &str) -> Option<T> {
         match ron::from_str(at.0) {
@@ -128,7 +148,11 @@ impl<'a> Reader<'a> {
 
     fn block(&mut self, at: At<'a>, node: &str) -> Vec<(String, At<'a>)> {
         match ron::from_str::<Block<'a>>(at.0) {
-            Ok(Block(entries)) => entries.into_iter().map(|(key, raw)| (key, self.at(raw))).collect(),
+            Ok(Block(entries)) => {
+                let entries: Vec<_> = entries.into_iter().map(|(key, raw)| (key, self.at(raw))).collect();
+                self.report_twice(node, &entries);
+                entries
+            }
             Err(error) => {
                 let line = at.1 + error.span.start.line.saturating_sub(1);
                 self.parsed.report(Some(line), node, None, format!("a block of `name: value` is expected here: {}", error.code));

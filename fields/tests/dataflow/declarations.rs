@@ -226,6 +226,8 @@ fn a_registry_refuses_what_contradicts_itself() {
         (NodeType::new("X", "").field(Field::new("aB", 0i32)).field(Field::new("a_b", 0i32)), "two fields are called `a_b`"),
         (NodeType::new("X", "").field(Field::new("", 0i32)), "a field has no name"),
         (NodeType::new("X", "").field(Field::choice("c", &["a", "b"], "z")), "none of its choices: a, b"),
+        (NodeType::new("X", "").field(Field::choice("c", &["a", "b", "a"], "a")), "has the choice `a` twice"),
+        (NodeType::new("X", "").field(Field::new("t", "text").range(0.0, 1.0)), "which fields of type string do not have"),
         (NodeType::new("X", "").field(Field::new("a", 0i32).range(2.0, 1.0)), "empty range"),
         (NodeType::new("X", "").field(Field::new("a", 0i32).range(1.0, 2.0)), "default 0 of field `a` is outside"),
     ] {

@@ -32,7 +32,7 @@ fn a_value_is_traced_through_routes_and_evaluations_to_who_wrote_it() {
         `foot.real` = 42.0, in frame 1 (0.500 s) by the route from `inc.out`\n  \
           `inc.out` = 42, in frame 1 (0.500 s) by the evaluation of `inc` (Inc)\n    \
             `inc.in` = 41, in frame 1 (0.500 s) by the route from `clock.x`\n      \
-              `clock.x` = 41, in frame 1 (0.000 s) from outside at market.rhai:12\n";
+              `clock.x` = 41, in frame 1 (0.500 s) from outside at market.rhai:12\n";
     assert_eq!(why(&graph, foot, "real"), expected);
     let causes = graph.why(at(&graph, foot, "real"));
     assert_eq!(causes[3].by, By::Outside { origin: Some("market.rhai:12".into()) });

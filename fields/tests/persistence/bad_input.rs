@@ -89,6 +89,11 @@ const ROWS: &[(&str, &str, &str)] = &[
         "nodes: [\n(id: \"a\", type: \"Adder\", dynamic: [(name: \"b\", type: \"f32\", default: 1.0, value: 2.0)]),\n]",
         "line 3: `a.b`: `a` (Adder) has a field `b` already",
     ),
+    (
+        "value that stands there twice",
+        "nodes: [\n(id: \"a\", type: \"All\", fields: {\"i32_one\": 1,\n\"i32_one\": 2}),\n]",
+        "line 4: `a`: `i32_one` stands here again; the last one counts",
+    ),
 ];
 
 const HEAD: &str = "(format: \"umbriel-world\", version: (1, 0),\n";
@@ -114,6 +119,7 @@ fn every_mistake_is_named_and_the_rest_loads() {
 #[test]
 fn what_is_no_world_is_refused() {
     let later = HEAD.replace("(1, 0)", "(2, 3)") + ")";
+    let nested = format!("{HEAD}nodes: {}", "[".repeat(100_000));
     for (data, expected) in [
         (&b"\xff\xfe"[..], "this is no saved world: byte 0 is neither text nor the start of a binary save"),
         (b"", "line 1, column 1: Unexpected end of RON"),
@@ -122,11 +128,18 @@ fn what_is_no_world_is_refused() {
         (later.as_bytes(), "the file has format version 2.3; versions from 1.0 on up to the next major one can be read"),
         (b"\x89UMB", "the file is damaged: it ends after 4 bytes, within its head"),
         (b"(format: \"umbriel-world\",\n nodes: [(}])", "line 2, column 11: Unexpected char '}'"),
+        (nested.as_bytes(), "line 2, column 71: the values are nested too deeply"),
     ] {
         let error = save::load(data, types()).unwrap_err().to_string();
         println!("| {} | {error} |", String::from_utf8_lossy(data).escape_default());
         assert_eq!(error, expected);
     }
+}
+
+#[test]
+fn a_byte_order_mark_is_no_mistake() {
+    let (graph, reports) = save::load(format!("\u{feff}{HEAD}nodes: [\n(id: \"a\", type: \"Addr\")])"), types()).unwrap();
+    assert_eq!((graph.node_count(), reports.len(), reports[0].line), (0, 1, Some(3)));
 }
 
 #[test]

@@ -25,6 +25,33 @@ fn a_clock_that_loops() {
 }
 
 #[test]
+fn a_clock_that_no_longer_loops_runs_to_the_end_of_its_cycle() {
+    let start = || vec![("loop", true.into()), ("cycle_interval", Value::from(2.0f64))];
+    check(
+        "TimeSensor",
+        vec![
+            (0.0, start(), ("is_active", true.into())),
+            (4.5, vec![], ("fraction_changed", 0.25f32.into())),
+            row(5.0, "loop", false, "fraction_changed", 0.5f32),
+            (5.5, vec![], ("is_active", true.into())),
+            (6.5, vec![], ("fraction_changed", 1.0f32.into())),
+            (7.0, vec![], ("elapsed_time", Time(6.0).into())),
+            (7.5, vec![], ("is_active", false.into())),
+        ],
+    );
+    // At the very end of a cycle nothing more is to come.
+    check(
+        "TimeSensor",
+        vec![
+            (0.0, start(), ("is_active", true.into())),
+            (4.0, vec![], ("fraction_changed", 1.0f32.into())),
+            row(4.5, "loop", false, "is_active", false),
+            (5.0, vec![], ("elapsed_time", Time(4.0).into())),
+        ],
+    );
+}
+
+#[test]
 fn a_clock_that_runs_once() {
     check(
         "TimeSensor",
@@ -112,6 +139,8 @@ fn a_scheduler_tells_when_times_have_come() {
             (23.2, vec![], ("event_time", Time(23.0).into())),
         ],
     );
+    let endless = vec![("times", times(&[0.0])), ("period", Value::from(1e-300f64))];
+    check("Scheduler", vec![(1e9, endless, ("index", 0i32.into()))]);
     for (list, period, words) in [
         (times(&[2.0, 1.0]), 0.0f64, "descend"),
         (times(&[-1.0]), 0.0, "times[0] is -1 s"),

@@ -74,7 +74,11 @@ fn an_added_field_is_another_input() {
     assert_eq!(graph.get_named::<f64>(sum, "value").unwrap(), 11.0);
     graph.add_field(sum, Field::new("what", "text")).unwrap();
     let report = graph.evaluate(0.0, &mut NoHost);
-    assert!(report.problems[0].message.contains("cannot be read as f64"), "{:?}", report.problems);
+    assert!(
+        report.problems[0].message.contains("`what` is of type string, which cannot be read as f64"),
+        "{:?}",
+        report.problems
+    );
 }
 
 #[test]
@@ -90,10 +94,13 @@ fn intervals_map_and_clamp() {
         ],
     );
     let (mut graph, map) = graph_of("IntervalMap");
-    graph.set_named(map, "from_max", 0.0f64).unwrap();
-    assert_eq!(graph.evaluate(0.0, &mut NoHost).problems.len(), 1);
-    graph.set_named(map, "set_value", 0.5f64).unwrap();
-    assert_eq!(graph.evaluate(0.0, &mut NoHost).problems.len(), 0);
+    for (field, wrong, right) in [("from_max", 0.0f64, 1.0f64), ("to_min", f64::NEG_INFINITY, 0.0)] {
+        graph.set_named(map, field, wrong).unwrap();
+        assert_eq!(graph.evaluate(0.0, &mut NoHost).problems.len(), 1, "{field}");
+        graph.set_named(map, "set_value", wrong.min(0.5)).unwrap();
+        assert_eq!(graph.evaluate(0.0, &mut NoHost).problems.len(), 0, "{field}");
+        graph.set_named(map, field, right).unwrap();
+    }
 }
 
 #[test]

@@ -145,6 +145,22 @@ fn a_filter_is_steady_at_rest_and_quick_in_motion() {
             row(2.0, "set_value", 99.0f32, "velocity", share),
         ],
     );
+    // What is not finite is left out, and what comes after it counts.
+    let (mut graph, node) = graph_of("ScalarFilter");
+    for (time, measured, faults) in [(0.0, 1.0f32, 0), (1.0, f32::NAN, 1), (2.0, f32::INFINITY, 1), (3.0, 1.0, 0)] {
+        graph.set_named(node, "set_value", measured).unwrap();
+        assert_eq!(graph.evaluate(time, &mut NoHost).problems.len(), faults, "{measured}");
+        assert_eq!(graph.get_named::<f32>(node, "value_changed").unwrap(), 1.0, "{measured}");
+    }
+}
+
+#[test]
+fn no_way_leads_to_infinity_or_back() {
+    let frame = |time, to: f32| row(time, "set_destination", to, "value_changed", to);
+    check(
+        "ScalarDamper",
+        vec![frame(0.0, 1.0), frame(0.1, f32::INFINITY), frame(0.2, 2.0), (0.2, vec![], ("is_active", false.into()))],
+    );
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use glam::{Quat, Vec2, Vec3};
 
 use super::{check, graph_of};
-use crate::{Color, NoHost, Value};
+use crate::{Color, NoHost, Same, Value};
 
 fn keys(fractions: &[f32], values: impl Into<Value>, interpolation: &'static str) -> Vec<(&'static str, Value)> {
     vec![("key", fractions.into()), ("key_value", values.into()), ("interpolation", interpolation.into())]
@@ -168,6 +168,7 @@ fn bad_keys_are_reported_once_and_move_nothing() {
         ("SquadOrientationInterpolator", keys(&[0.0, 1.0], vec![Quat::IDENTITY], "")[..2].to_vec(), "2 keys need 2"),
         ("EaseInEaseOut", vec![("key", vec![0.0f32, 1.0].into())], "2 keys need 2 eases"),
         ("BooleanSequencer", keys(&[0.0, 1.0], vec![true], "")[..2].to_vec(), "2 keys need 2"),
+        ("IntegerSequencer", keys(&[1.0, 0.0], vec![7i32, 8], "")[..2].to_vec(), "descend"),
     ] {
         let (mut graph, node) = graph_of(node_type);
         for (name, value) in writes {
@@ -181,5 +182,9 @@ fn bad_keys_are_reported_once_and_move_nothing() {
             graph.set_named(node, "set_fraction", fraction).unwrap();
             assert_eq!(graph.evaluate(0.0, &mut NoHost).problems, [], "{words}");
         }
+        let outputs = ["value_changed", "modified_fraction_changed"];
+        let output = outputs.into_iter().find_map(|name| graph.field(node, name).ok()).unwrap();
+        let untouched = graph.declaration(output).unwrap().default.clone();
+        assert!(graph.value(output).unwrap().same(&untouched), "{node_type}, {words}: {:?}", graph.value(output));
     }
 }

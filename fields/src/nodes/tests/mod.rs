@@ -33,7 +33,7 @@ fn check(node_type: &str, frames: Vec<Frame<'_>>) {
 /// Equal but for rounding.
 fn near(a: &Value, b: &Value) -> bool {
     match (a, b) {
-        (Value::F32(a), Value::F32(b)) => (a - b).abs() < 1e-5,
+        (Value::F32(a), Value::F32(b)) => a == b || (a - b).abs() < 1e-5,
         (Value::F64(a), Value::F64(b)) => (a - b).abs() < 1e-5,
         (Value::Vec3(a), Value::Vec3(b)) => a.abs_diff_eq(*b, 1e-5),
         (Value::Vec2(a), Value::Vec2(b)) => a.abs_diff_eq(*b, 1e-5),
