@@ -27,6 +27,9 @@ pub(crate) enum OpenError {
     /// The recording is wrong, or cannot be written.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// The recording would take the place of what is recorded.
+    #[error("{}: the world is made of this file; record to another one", .0.display())]
+    RecordsOver(PathBuf),
 }
 
 /// Extension of saved worlds.
@@ -111,6 +114,10 @@ impl Session {
 
     /// Records every frame from now on.
     pub(crate) fn record(&mut self, path: &Path) -> Result<(), OpenError> {
+        let is_it = |file: &PathBuf| matches!((file.canonicalize(), path.canonicalize()), (Ok(file), Ok(path)) if file == path);
+        if self.files().iter().any(is_it) {
+            return Err(OpenError::RecordsOver(path.to_path_buf()));
+        }
         self.recording = Some(Recording::start(self.source.graph_mut(), path)?);
         Ok(())
     }

@@ -71,3 +71,13 @@ fn damaged_recordings_are_told() {
         println!("{name}: {}", run.stderr.trim());
     }
 }
+
+#[test]
+fn a_world_is_not_recorded_over() {
+    let world = file("over.rhai");
+    let script = "world.add(shape(sphere(1)));";
+    std::fs::write(&world, script).expect("a world can be written");
+    let run = umbriel(&["run", text(&world), "--headless", "--size", "8x8", "--record", text(&world)]);
+    assert!(!run.ok && run.stderr.contains("over.rhai: the world is made of this file"), "{}", run.stderr);
+    assert_eq!(std::fs::read_to_string(&world).expect("the world is there"), script);
+}

@@ -18,6 +18,7 @@ use crate::reference::FunctionDoc;
 use crate::source::Source;
 use crate::stage::{Handler, Node, Stage};
 use crate::words;
+use umbriel_fields::canonical;
 
 /// Stack for scripts: nesting of values is bounded by what fits onto it, see `weigh`. Only what is touched is used.
 const STACK: usize = 512 << 20;
@@ -231,6 +232,10 @@ fn set_hooks(engine: &mut Engine, stage: &Rc<Stage>, constants: &Constants) {
         if index != 0 || context.scope().contains(name) {
             return Ok(None);
         }
+        // The inputs of an Expression are fields, which any spelling names.
+        if let Some(input) = context.scope().get(&canonical(name)).filter(|_| stage.is_alone()) {
+            return Ok(Some(input.clone()));
+        }
         let running = context.global_runtime_state().constants.as_ref().and_then(|c| c.borrow().get(name).cloned());
         let running = running.or_else(|| stage.running_constants.borrow().get(name).cloned());
         Ok(running.or_else(|| constants.borrow().get(name).cloned()))
@@ -262,12 +267,16 @@ fn set_constants(engine: &mut Engine, world: Option<Node>) {
 impl Known for Script {
     fn no_function(&self, signature: &str) -> String {
         let (name, types) = signature.split_once(" (").unwrap_or((signature, ""));
-        let types = types.trim_end_matches(')').replace("i64", "int").replace("f64", "number");
+        let types = types.trim_end_matches(')').replace("&str | ImmutableString | String", "string");
+        let types = types.replace("i64", "int").replace("f64", "number");
         if !name.starts_with(|c: char| c.is_alphabetic() || c == '_') {
             return format!("`{name}` does not work with {}", types.replace(", ", " and "));
         }
         let forms: Vec<&str> = self.docs.iter().filter(|doc| doc.name() == name).map(|doc| doc.signature).collect();
         let own: Vec<String> = self.ast.iter_functions().filter(|f| f.name == name).map(|f| f.to_string()).collect();
+        if let Some((_, parameters)) = own.first().filter(|_| name.starts_with("anon$")).and_then(|own| own.split_once('(')) {
+            return format!("a closure of |{}| does not take ({types})", parameters.trim_end_matches(')'));
+        }
         if !forms.is_empty() || !own.is_empty() {
             let forms: Vec<&str> = forms.into_iter().chain(own.iter().map(String::as_str)).collect();
             return format!("`{name}` does not take ({types}); there is {}", forms.join(" and "));

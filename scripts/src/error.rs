@@ -148,6 +148,7 @@ pub(crate) fn problem_from(error: &EvalAltResult, source: &Source, known: &dyn K
              instead of `node.on_change(\"field\", handler)`",
         ),
         EvalAltResult::ErrorStackOverflow(_) => Fault::new("functions call each other too deeply"),
+        EvalAltResult::ErrorDotExpr(text, _) => Fault::new(no_part(text)),
         other => Fault::new(text_without_place(other)),
     };
     Problem { message: fault.message, file, line, column, node: fault.node, field: fault.field, calls }
@@ -157,6 +158,16 @@ pub(crate) fn thrown_text(thrown: &Dynamic) -> Fault {
     match thrown.read_lock::<Fault>() {
         Some(fault) => fault.clone(),
         None => Fault::new(thrown.to_string()),
+    }
+}
+
+/// rhai's words for a part that a value does not have: `No writable property 'w' - a setter is not registered for type 'vec3' to handle 'i64'`.
+fn no_part(text: &str) -> String {
+    let quoted: Vec<&str> = text.split('\'').skip(1).step_by(2).collect();
+    match quoted[..] {
+        [part, owner] => format!("a value of type {owner} has no part `{part}`"),
+        [part, owner, given] => format!("a value of type {owner} has no part `{part}` that takes a value of type {given}"),
+        _ => text.to_string(),
     }
 }
 

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use rhai::{AST, Dynamic, Engine, EvalAltResult, Map, Scope};
-use umbriel_fields::{Field, Graph, NodeId, NodeType};
+use umbriel_fields::{Field, Graph, NodeId, NodeType, canonical};
 
 use crate::engine::Script;
 use crate::error::{Fault, Outcome, hint, inner_of, text_without_place, thrown_text};
@@ -54,6 +54,11 @@ fn fill(stage: &Stage, engine: &Engine, node: Node, parts: &Map) -> Outcome<()> 
         }
     };
     for (name, value) in &inputs {
+        let variable = canonical(name);
+        let readable = variable.starts_with(char::is_alphabetic) && engine.compile_expression(&variable).is_ok();
+        if !readable {
+            return stage.fault_at(node, name, format!("the code cannot read an input that is called `{name}`")).throw();
+        }
         stage.add_field(node, name, value)?;
     }
     let other = |name: &str| !["inputs", CODE, VALUE].contains(&name);

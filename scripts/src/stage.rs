@@ -159,9 +159,14 @@ impl Stage {
         result
     }
 
+    /// Is an Expression being computed?
+    pub(crate) fn is_alone(&self) -> bool {
+        self.alone.get()
+    }
+
     /// Refuses what an Expression must not do.
     pub(crate) fn may_change(&self) -> Outcome<()> {
-        match self.alone.get() {
+        match self.is_alone() {
             true => fail("an expression sees its inputs only: it reads no other nodes and changes nothing"),
             false => Ok(()),
         }
@@ -264,6 +269,11 @@ impl Stage {
             (FieldType { kind: Kind::Enum, multiple: false }, Ok(on)) => self.switch(field, on),
             _ => to_value(given, wanted).map_err(|why| {
                 let label = self.label(node);
+                let choices = self.read(|graph| graph.declaration(field).map(|declared| declared.choices.join(", ")));
+                let why = match choices {
+                    Ok(choices) if wanted.kind == Kind::Enum => format!("{why}; it takes one of {choices}"),
+                    _ => why,
+                };
                 self.fault_at(node, name, format!("field `{name}` of {label}: {why}"))
             })?,
         };

@@ -46,6 +46,9 @@ pub(crate) fn to_value(given: &Dynamic, wanted: FieldType) -> Result<Value, Stri
 
 /// One element; None if the given value has nothing to do with the kind.
 fn element(given: &Dynamic, kind: Kind) -> Option<Result<Value, String>> {
+    if let Some(why) = too_large(given, kind) {
+        return Some(Err(why));
+    }
     let value = match kind {
         Kind::Bool => Value::Bool(given.as_bool().ok().or_else(|| given.as_int().ok().map(|i| i != 0))?),
         Kind::I32 => match i32::try_from(whole(given)?) {
@@ -110,6 +113,13 @@ pub(crate) fn shown(single: f32) -> f64 {
         true => f64::from(single),
         false => single.to_string().parse().unwrap_or(f64::from(single)),
     }
+}
+
+/// Why an array of numbers cannot be a vector or a colour, though it looks like one.
+fn too_large(given: &Dynamic, kind: Kind) -> Option<String> {
+    let array = given.read_lock::<Array>()?;
+    let of_singles = matches!(kind, Kind::Vec2 | Kind::Vec3 | Kind::Vec4 | Kind::Color | Kind::ColorA);
+    array.iter().filter(|_| of_singles).filter_map(number).find_map(|number| single(number).err())
 }
 
 fn floats<const N: usize>(given: &Dynamic) -> Option<[f32; N]> {

@@ -409,7 +409,8 @@ impl Callbacks<'_> {
         stage.evaluating.borrow_mut().push((Node(node), level));
         stage.with(graph, || {
             if let Err(mut problem) = self.script.call(&evaluate, vec![Node(node).into(), self.time_s.into()]) {
-                let label = stage.label(Node(node));
+                let gone = || format!("a deleted {type_name}");
+                let label = if stage.read(|graph| graph.contains(node)) { stage.label(Node(node)) } else { gone() };
                 problem.node = problem.node.or_else(|| Some(label.clone()));
                 switch_off(stage, problem, &format!("evaluate of {label} is switched off"));
                 stage.switched_off.borrow_mut().insert(node);

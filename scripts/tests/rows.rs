@@ -49,6 +49,10 @@ fn values() {
         ("", ["mat4(vec3(1, 2, 3), euler(0, 0, 0), vec3(2)) * vec3(1, 1, 1)", "vec3(3, 4, 5)"]),
         ("", ["grid_index(2, 2)", "[0, 2, 1, 1, 2, 3]"]),
         ("", ["each(3, |i| i * i)", "[0, 1, 4]"]),
+        (
+            "let e = make(\"Expression\", #{ inputs: #{ maxSpeed: 2.0, step_size: 0.5 }, code: \"maxSpeed * stepSize\" });",
+            ["[e.value, e.max_speed]", "[1.0, 2.0]"],
+        ),
         ("let a = [3, 1, 2, 1]; a.sort(|x, y| y - x);", ["a", "[3, 2, 1, 1]"]),
         ("", ["sin(0) + max(1, 2.5)", "2.5"]),
         ("", ["smoothstep(0, 2, 1)", "0.5"]),
@@ -109,6 +113,20 @@ fn errors() {
         ("include(\"../secret.rhai\");", &["test:1:9", "out of the world's folder"]),
         ("let x = include(\"a.rhai\");", &["test:1:", "include"]),
         ("throw \"my own words\";", &["test:1:", "my own words"]),
+        ("let b = make(\"Box\");\nb.size = [1e300, 0, 0];", &["test:2:", "`size`", "1e300 is too large"]),
+        ("let l = make(\"SpotLight\");\nl.shadows = 3;", &["test:2:", "`shadows`", "whole number 3", "one of none, map, volume"]),
+        ("let a = group([]);\nadd_field(a, \"Name\", 1);", &["test:2:1", "every node has a `name` already"]),
+        ("define(\"A\", #{ fields: #{ type: 1 } });", &["test:1:1", "every node has a `type` already"]),
+        ("define(\"A\", #{ fields: #{ a: field(\"x\", #{ choices: [\"x\", \"x\"] }) } });", &["the choice `x` twice"]),
+        ("define(\"A\", #{ fields: #{ a: field(\"x\", #{ range: [0, 1] }) } });", &["`a`", "range", "string do not have"]),
+        ("let b = make(\"Box\");\nb.size.w = 1;", &["test:2:8", "type vec3 has no part `w` that takes"]),
+        ("let b = make(\"Box\");\nlet w = b.size.w;", &["test:2:16", "type vec3 has no part `w`"]),
+        ("let b = make(\"Box\");\nroute(b, \"size\", (), \"size\");", &["test:2:1", "does not take (Node, string, (), string)"]),
+        ("let f = |a, b| a + b;\nf.call(1, 2, 3);", &["test:2:", "a closure of |a, b| does not take (int, int, int)"]),
+        (
+            "make(\"Expression\", #{ inputs: #{ let: 1.0 }, code: \"2\" });",
+            &["test:1:1", "cannot read an input that is called `let`"],
+        ),
     ] {
         let text = error_of(script);
         for piece in pieces {

@@ -37,7 +37,11 @@ pub(crate) fn declared(name: &str, given: &Dynamic) -> Result<Field, String> {
         None => Field::new("field", natural(given)?),
     };
     field.name = Arc::from(canonical(name).as_str());
-    Ok(field)
+    // Found before any field, so that one of this name could not be reached.
+    match &*field.name {
+        taken @ ("name" | "type") => Err(format!("every node has a `{taken}` already, which is no field")),
+        _ => Ok(field),
+    }
 }
 
 fn kind(name: &str) -> Outcome<Kind> {

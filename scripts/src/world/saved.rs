@@ -9,10 +9,12 @@ use std::sync::Arc;
 use rhai::Dynamic;
 use umbriel_fields::save::{self, SaveError};
 use umbriel_fields::{Field, Graph, NodeId, NodeType};
+use umbriel_scenegraph::WORLD;
 
 use super::{Script, Settings, World, empty, folder_of, load};
 use crate::definition::{BEHAVIOUR, Behaviour, Definition, FRAME_TIME, SCRIPT_TYPE};
 use crate::error::{Problem, ScriptError};
+use crate::source::below;
 use crate::stage::{Node, Stage};
 
 /// The name of the node type.
@@ -78,7 +80,11 @@ fn open(path: &Path, data: &[u8], settings: &Settings) -> Result<(Graph, Script,
     let (bare, script) = empty(settings, Some(&folder));
     let (graph, reports) = save::load(data, bare.types().clone())?;
     let mut problems = Vec::new();
-    let (graph, script, reports) = match script_of(&graph).map(|url| folder.join(url)) {
+    let file = script_of(&graph).and_then(|url| {
+        let outside = |why| problems.push(problem(path, None, None, Some(URL.into()), why));
+        below(&folder, &url).map_err(outside).ok()
+    });
+    let (graph, script, reports) = match file {
         None => (graph, script, reports),
         Some(file) => match load(&file, settings) {
             // The nodes that the script made here are not those of the save.
@@ -97,6 +103,10 @@ fn open(path: &Path, data: &[u8], settings: &Settings) -> Result<(Graph, Script,
         problem(path, report.line, Some(report.node).filter(|name| !name.is_empty()), report.field, report.message)
     };
     problems.extend(reports.into_iter().map(said));
+    if graph.find(WORLD).is_none() {
+        let message = format!("there is no node `{WORLD}`, below which all stands that is shown");
+        problems.push(problem(path, None, None, None, message));
+    }
     problems.extend(wake(&mut graph, &script.stage).into_iter().map(|message| problem(path, None, None, None, message)));
     Ok((graph, script, problems))
 }
@@ -242,6 +252,17 @@ mod tests {
         for again in &mut opened {
             assert_eq!(again.problems().iter().map(ToString::to_string).collect::<Vec<_>>(), Vec::<String>::new());
         }
+        // A script outside of the folder is not read, and a world without its Group is told.
+        for (right, wrong, words) in [
+            ("w.rhai", "/etc/hostname", "\"/etc/hostname\" leads out of the world's folder"),
+            ("id: \"world\"", "id: \"earth\"", "there is no node `world`"),
+        ] {
+            let text = String::from_utf8(world.save(SaveForm::Text).unwrap()).unwrap();
+            std::fs::write(&file, text.replace(right, wrong)).unwrap();
+            let said: Vec<String> = World::open_save(&file).unwrap().problems().iter().map(ToString::to_string).collect();
+            assert!(said.iter().any(|said| said.contains(words)), "{said:?}");
+        }
+        std::fs::write(&file, world.save(SaveForm::Binary).unwrap()).unwrap();
         std::fs::remove_file(&script).unwrap();
         let mut alone = World::open_save(folder.join("w.umbriel")).unwrap();
         let said: Vec<String> = alone.problems().iter().map(ToString::to_string).collect();
@@ -249,7 +270,7 @@ mod tests {
             said.iter().any(|s| s.contains("w.rhai")) && said.iter().any(|s| s.contains("no node type `Double`")),
             "{said:?}"
         );
-        assert_eq!(alone.console("find(\"lift\").translation").unwrap(), "vec3(0, 3, 0)", "what is native is there");
+        assert_eq!(alone.console("find(\"lift\").translation").unwrap(), "vec3(0, 6, 0)", "what is native is there");
         std::fs::remove_dir_all(folder).unwrap();
     }
 }
