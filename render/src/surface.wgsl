@@ -46,8 +46,9 @@ fn vertex(v: Vertex) -> Fragment {
     return f;
 }
 
-// What all variants need to know. Called in uniform control flow: it takes derivatives.
-fn place(f: Fragment) -> Surface {
+// What all variants need to know. `covered` are the pixel's samples that are on the shape. Called in uniform control flow: it
+// takes derivatives.
+fn place(f: Fragment, covered: u32) -> Surface {
     load_params();
     var s: Surface;
     s.base_color = base_color_at(f.uv0, f.uv1, f.color);
@@ -67,7 +68,12 @@ fn place(f: Fragment) -> Surface {
         s.metallic *= m.b;
         s.roughness *= m.g;
     }
+    let across = dpdx(f.p_in_world);
+    let down = dpdy(f.p_in_world);
     s.position = f.p_in_world;
+    if MAPS {
+        s.position += mat2x3<f32>(across, down) * middle_of(covered);
+    }
     s.uv0 = f.uv0;
     s.uv1 = f.uv1;
     s.vertex_color = f.color;
@@ -76,8 +82,6 @@ fn place(f: Fragment) -> Surface {
     s.distance = length(to_eye);
     s.towards_eye = to_eye / max(s.distance, 1e-9);
 
-    let across = dpdx(f.p_in_world);
-    let down = dpdy(f.p_in_world);
     let area_normal = cross(across, down);
     let has_normal = dot(f.normal, f.normal) > 1e-12;
     s.is_unlit = shading() == UNLIT || !has_normal;
@@ -99,6 +103,22 @@ fn place(f: Fragment) -> Surface {
     s.base_color = layered(f, s);
     return surface(s);
 }
+
+// Middle of the covered samples from that of the pixel, pixels right and down. The middle of a pixel may lie beyond the shape's edge, and
+// so behind the next wall of a corner. (Interpolation at centroids would do, were it exact on all devices.)
+fn middle_of(covered: u32) -> vec2<f32> {
+    if covered == ALL_SAMPLES || view.first_sample.x == 0.0 {
+        return vec2<f32>(0.0);
+    }
+    let is_covered = vec4<f32>((vec4<u32>(covered) >> vec4<u32>(0u, 1u, 2u, 3u)) & vec4<u32>(1u));
+    let sum = vec2<f32>(dot(is_covered, SAMPLES_X), dot(is_covered, SAMPLES_Y));
+    return sum / max(dot(is_covered, vec4<f32>(1.0)), 1.0);
+}
+
+// The standard sample locations of Vulkan, Metal and Direct3D, from the middle of the pixel.
+const SAMPLES_X = vec4<f32>(-0.125, 0.375, -0.375, 0.125);
+const SAMPLES_Y = vec4<f32>(-0.375, -0.125, 0.125, 0.375);
+const ALL_SAMPLES = 15u;
 
 // Normal from the normal texture; where the mesh has no tangents they follow from the texture coordinates
 // (Mikkelsen 2020, Surface gradient-based bump mapping, section 3: the cotangent frame).
@@ -198,15 +218,15 @@ fn base(s: Surface, flags: u32) -> vec4<f32> {
 
 // Opaque surfaces: ambient and emitted light, and the view's lights.
 @fragment
-fn opaque(f: Fragment) -> @location(0) vec4<f32> {
-    let s = place(f);
+fn opaque(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
+    let s = place(f, covered);
     return vec4<f32>(base(s, f.flags).rgb, 1.0);
 }
 
 // The same with holes.
 @fragment
-fn masked(f: Fragment) -> @location(0) vec4<f32> {
-    let s = place(f);
+fn masked(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
+    let s = place(f, covered);
     if s.base_color.a < material.alpha_cutoff {
         discard;
     }
@@ -215,16 +235,16 @@ fn masked(f: Fragment) -> @location(0) vec4<f32> {
 
 // Mixed over what is behind: premultiplied.
 @fragment
-fn blended(f: Fragment) -> @location(0) vec4<f32> {
-    let s = place(f);
+fn blended(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
+    let s = place(f, covered);
     let color = base(s, f.flags);
     let alpha = saturate(color.a);
     return vec4<f32>(color.rgb * alpha, alpha);
 }
 
 // The view's lights alone, to be added to what is there.
-fn addition(f: Fragment, shadow: f32) -> vec4<f32> {
-    let s = place(f);
+fn addition(f: Fragment, covered: u32, shadow: f32) -> vec4<f32> {
+    let s = place(f, covered);
     if s.is_unlit || (material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff) {
         discard;
     }
@@ -232,19 +252,19 @@ fn addition(f: Fragment, shadow: f32) -> vec4<f32> {
 }
 
 @fragment
-fn added(f: Fragment) -> @location(0) vec4<f32> {
-    return addition(f, 1.0);
+fn added(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
+    return addition(f, covered, 1.0);
 }
 
 // The same where the light's shadow volumes are, for shapes whose own shader may make something of the shadow.
 @fragment
-fn added_in_shadow(f: Fragment) -> @location(0) vec4<f32> {
-    return addition(f, 1.0 - view.lights[0].shadow_intensity);
+fn added_in_shadow(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
+    return addition(f, covered, 1.0 - view.lights[0].shadow_intensity);
 }
 
 // Share of one light that a map lets through. Cone, distance and orientation do not count.
-fn share_through_map(f: Fragment) -> vec4<f32> {
-    let s = place(f);
+fn share_through_map(f: Fragment, covered: u32) -> vec4<f32> {
+    let s = place(f, covered);
     if material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff {
         discard;
     }
@@ -255,14 +275,14 @@ fn share_through_map(f: Fragment) -> vec4<f32> {
     let light = lights[view.shown_light];
     var lit = 1.0;
     if MAPS && light.face_count > 0u && casts_on(light, view.shown_light, f.flags) {
-        lit = map_visibility(light, f.p_in_world, s.face_normal);
+        lit = map_visibility(light, s.position, s.face_normal);
     }
     return vec4<f32>(vec3<f32>(lit), 1.0);
 }
 
 @fragment
-fn visibility(f: Fragment) -> @location(0) vec4<f32> {
-    return share_through_map(f);
+fn visibility(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
+    return share_through_map(f, covered);
 }
 
 // Share of the view's one light that its shadow texture shows.
@@ -273,22 +293,22 @@ fn shown_share(f: Fragment) -> f32 {
 
 // The view's one light, to be added to what is there, as far as its shadow texture shows it.
 @fragment
-fn added_soft(f: Fragment) -> @location(0) vec4<f32> {
+fn added_soft(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
     let shown = 1.0 - view.lights[0].shadow_intensity * (1.0 - shown_share(f));
-    return addition(f, shown);
+    return addition(f, covered, shown);
 }
 
 // The share alone.
 @fragment
-fn visibility_soft(f: Fragment) -> @location(0) vec4<f32> {
+fn visibility_soft(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
     let shown = shown_share(f);
-    return share_through_map(f) * shown;
+    return share_through_map(f, covered) * shown;
 }
 
 // Depth of what has holes.
 @fragment
 fn holes(f: Fragment) -> @location(0) vec4<f32> {
-    if place(f).base_color.a < material.alpha_cutoff {
+    if place(f, ALL_SAMPLES).base_color.a < material.alpha_cutoff {
         discard;
     }
     return vec4<f32>(0.0);

@@ -118,7 +118,7 @@ fn shadow_texel(layer: Layer, f: Fragment, s: Surface, uv: vec2<f32>) -> f32 {
     let light = lights[texture.light];
     var lit = 1.0;
     if light.face_count > 0u {
-        lit = map_visibility(light, f.p_in_world, s.face_normal);
+        lit = map_visibility(light, s.position, s.face_normal);
     }
     return select(lit, 1.0 - lit, compare == GREATER_EQUAL);
 }

@@ -10,6 +10,7 @@ struct Surface {
     // Unit normal of the triangle, towards the eye.
     face_normal: vec3<f32>,
     towards_eye: vec3<f32>,
+    // On what of the triangle the pixel shows.
     position: vec3<f32>,
     // From the eye, metres.
     distance: f32,

@@ -1,8 +1,9 @@
 // Look-up of shadow maps. All maps are tiles in the layers of one array; a light has one face (spot), several nested
 // ones (directional: the first that holds the point counts) or six (all directions: by major axis).
 //
-// Every texel that the filter covers is compared with the receiver's own plane at the texel's centre. A plane of the
-// world stays a plane in the map's space, so a flat receiver needs next to no bias; what is left covers curvature.
+// Every texel that the filter covers is compared with the receiver's own plane at the texel's centre, and at the edges of shadows the
+// caster's plane with the receiver's place. A plane of the world stays a plane in the map's space, so neither flat receivers nor bent
+// ones nor corners need a bias; what is left of it covers how exactly maps are drawn.
 
 struct MapFace {
     map_from_world: mat4x4<f32>,
@@ -89,63 +90,93 @@ fn face_visibility(light: Light, face: MapFace, p_in_world: vec3<f32>, face_norm
     let cosine = max(abs(dot(face_normal, towards)), 0.03);
     let slope = sqrt(1.0 - cosine * cosine) / cosine;
 
-    // Texels of height that a caster may have over the receiver's plane before it counts: some right above the
-    // receiver, for curvature, and more to the sides, where filters meet the other wall of a corner.
-    // Measured on the sample town: less of the second draws lines into corners. A sheet that stands on the receiver looks
-    // like a wall from the light, but hides what is right behind it: there the second is not given.
-    var tolerance = vec2<f32>(0.2, 2.5);
-    var towards_light = 0.0;
-    if light.slope_bias >= 0.0 || light.constant_bias >= 0.0 {
-        tolerance = vec2<f32>(0.0);
-        towards_light = max(light.slope_bias, 0.0) * texel * slope + max(light.constant_bias, 0.0);
+    // Depth is compared as exactly as it is drawn: corners lie on steps of 1/256 texel, which count for more where the
+    // receiver is steep, and numbers are rounded. By hand, the bias is what was asked for and nothing else.
+    let is_by_hand = light.slope_bias >= 0.0 || light.constant_bias >= 0.0;
+    var p = p_in_world;
+    if is_by_hand {
+        p += towards * (max(light.slope_bias, 0.0) * texel * slope + max(light.constant_bias, 0.0));
     }
-    let p = p_in_world + towards * towards_light;
-
     let clip = face.map_from_world * vec4<f32>(p, 1.0);
     if clip.w <= 0.0 || clip.z < 0.0 {
         return 1.0;
     }
     let ndc = clip.xyz / clip.w;
     let side = f32(face.tile.z);
-    let t = (ndc.xy * vec2<f32>(0.5, -0.5) + 0.5) * side;
+    var r: Receiver;
+    r.t = (ndc.xy * vec2<f32>(0.5, -0.5) + 0.5) * side;
+    r.depth = ndc.z;
 
     // Plane of the receiver in the map's space: depth per texel. A clamped slope keeps grazing receivers finite.
-    let step = face.map_from_world * vec4<f32>(towards * texel, 0.0);
-    let depth_per_tolerance = (clip.z + step.z) / (clip.w + step.w) - ndc.z;
-    tolerance *= depth_per_tolerance;
-
     let plane_in_world = vec4<f32>(face_normal, -dot(face_normal, p));
     let plane = plane_in_world * face.world_from_map;
-    var depth_per_texel = vec2<f32>(0.0);
     if abs(plane.z) > 1e-20 {
-        depth_per_texel = -plane.xy / plane.z * vec2<f32>(2.0, -2.0) / side;
+        r.depth_per_texel = -plane.xy / plane.z * vec2<f32>(2.0, -2.0) / side;
     }
-    let steepest = 0.25 * ndc.z;
     if face.light.w > 0.5 {
-        depth_per_texel = clamp(depth_per_texel, vec2<f32>(-steepest), vec2<f32>(steepest));
+        let steepest = 0.25 * ndc.z;
+        r.depth_per_texel = clamp(r.depth_per_texel, vec2<f32>(-steepest), vec2<f32>(steepest));
+    }
+    if !is_by_hand {
+        // What a texel's length towards the light is in depth.
+        let step = face.map_from_world * vec4<f32>(towards * texel, 0.0);
+        let depth_of_texel = (clip.z + step.z) / (clip.w + step.w) - ndc.z;
+        let rounding = DEPTH_ROUNDING * select(1.0, ndc.z, face.light.w > 0.5);
+        r.tolerance = depth_of_texel * (CLOSE + SNAP * slope) + rounding;
+        r.beside = depth_of_texel * BESIDE;
+        r.steepest = depth_of_texel * STEEPEST;
     }
 
-    if light.filter_width > 0.0 {
-        tolerance.y *= saturate(2.5 * filtered(face, 1.0, t, ndc.z + tolerance.x, depth_per_texel, 0.0));
+    if (light.map_flags & MAP_PCSS) != 0u {
+        return contact_hardening(light, face, r);
     }
-
-    if (light.map_flags & (MAP_POISSON | MAP_PCSS)) != 0u {
-        let r = Receiver(t, ndc.z + tolerance.x, depth_per_texel, tolerance.y);
-        if (light.map_flags & MAP_PCSS) != 0u {
-            return contact_hardening(light, face, r);
-        }
+    if (light.map_flags & MAP_POISSON) != 0u {
         return disc_filtered(face, r, DISC_RADIUS, DISC_SAMPLES);
     }
     if light.filter_width == 0.0 {
-        let i = clamp(floor(t), vec2<f32>(0.0), vec2<f32>(side - 1.0));
-        let stored = textureLoad(maps, vec2<u32>(i) + face.tile.xy, face.tile.w, 0);
-        return select(0.0, 1.0, stored <= ndc.z + tolerance.x + dot(depth_per_texel, i + 0.5 - t));
+        let centre = clamp(floor(r.t), vec2<f32>(0.0), vec2<f32>(side - 1.0)) + 0.5;
+        return select(1.0, 0.0, hides(face, r, centre));
     }
-    return filtered(face, light.filter_width, t, ndc.z + tolerance.x, depth_per_texel, tolerance.y);
+    return filtered(face, light.filter_width, r);
 }
 
-// `width` bilinear comparisons in a row and a column, as weighted single comparisons: four texels per gather.
-fn filtered(face: MapFace, width: f32, t: vec2<f32>, depth: f32, depth_per_texel: vec2<f32>, tolerance: f32) -> f32 {
+// The receiver as the filters see it.
+struct Receiver {
+    // Place in the tile, texels.
+    t: vec2<f32>,
+    depth: f32,
+    depth_per_texel: vec2<f32>,
+    // How much nearer to the light a caster has to be, depth.
+    tolerance: f32,
+    // The same per texel beside the receiver.
+    beside: f32,
+    // Slope up to which the plane of a caster is believed, depth per texel. 0: planes of casters do not count.
+    steepest: f32,
+};
+
+// Shares of a texel by which depths may be nearer: always, and times the slope of the receiver.
+const CLOSE: f32 = 0.03;
+const SNAP: f32 = 0.02;
+// Texels of depth per texel beside the receiver, for what is smaller than a texel and shows no plane.
+const BESIDE: f32 = 0.25;
+// Of rounded numbers, depth.
+const DEPTH_ROUNDING: f32 = 3e-7;
+// See Receiver.steepest, texels of depth per texel.
+const STEEPEST: f32 = 16.0;
+
+fn stored_at(face: MapFace, t: vec2<f32>) -> f32 {
+    let inside = clamp(floor(t), vec2<f32>(0.0), vec2<f32>(f32(face.tile.z) - 1.0));
+    return textureLoad(maps, vec2<u32>(inside) + face.tile.xy, face.tile.w, 0);
+}
+
+// Depth from which on something hides the receiver, at an offset in texels.
+fn expected_at(r: Receiver, offset: vec2<f32>) -> f32 {
+    return r.depth + dot(r.depth_per_texel, offset) + r.tolerance;
+}
+
+// `width` bilinear comparisons in a row and in a column, as weighted single comparisons: four texels per gather.
+fn filtered(face: MapFace, width: f32, r: Receiver) -> f32 {
+    let t = r.t;
     let layer_size = vec2<f32>(textureDimensions(maps));
     let side = f32(face.tile.z);
     let first = floor(t - 0.5 * width);
@@ -162,16 +193,11 @@ fn filtered(face: MapFace, width: f32, t: vec2<f32>, depth: f32, depth_per_texel
             let weight_x = saturate(0.5 * (width + 1.0) - abs(vec2<f32>(near.x, far.x)));
             let weight_y = saturate(0.5 * (width + 1.0) - abs(vec2<f32>(near.y, far.y)));
             // Order of textureGather: (near, far), (far, far), (far, near), (near, near).
-            let expected = depth + vec4<f32>(
-                dot(depth_per_texel, vec2<f32>(near.x, far.y)),
-                dot(depth_per_texel, vec2<f32>(far.x, far.y)),
-                dot(depth_per_texel, vec2<f32>(far.x, near.y)),
-                dot(depth_per_texel, vec2<f32>(near.x, near.y)),
-            ) + tolerance * vec4<f32>(
-                length(vec2<f32>(near.x, far.y)),
-                length(vec2<f32>(far.x, far.y)),
-                length(vec2<f32>(far.x, near.y)),
-                length(vec2<f32>(near.x, near.y)),
+            let expected = vec4<f32>(
+                expected_at(r, vec2<f32>(near.x, far.y)),
+                expected_at(r, far),
+                expected_at(r, vec2<f32>(far.x, near.y)),
+                expected_at(r, near),
             );
             let weights = vec4<f32>(
                 weight_x.x * weight_y.y,
@@ -182,16 +208,60 @@ fn filtered(face: MapFace, width: f32, t: vec2<f32>, depth: f32, depth_per_texel
             lit += dot(weights, select(vec4<f32>(0.0), vec4<f32>(1.0), stored <= expected));
         }
     }
+    lit /= width * width;
+    // Somewhere between: an edge of a shadow, or the other wall of a corner.
+    if r.steepest > 0.0 && lit > 0.0 && lit < 1.0 {
+        return filtered_by_planes(face, width, r);
+    }
+    return lit;
+}
+
+// The same, where what is nearer must hide the receiver by its own plane too. The receiver's plane goes on behind the other wall of a
+// corner, and so does that wall's plane behind the receiver: they hide each other only where each is in front of the other.
+fn filtered_by_planes(face: MapFace, width: f32, r: Receiver) -> f32 {
+    let first = floor(r.t - 0.5 * width) + 0.5;
+    let count = i32(width) + 1;
+    var lit = 0.0;
+    for (var y = 0; y < count; y++) {
+        for (var x = 0; x < count; x++) {
+            let centre = first + vec2<f32>(f32(x), f32(y));
+            let offset = centre - r.t;
+            let weights = saturate(0.5 * (width + 1.0) - abs(offset));
+            if !hides(face, r, centre) {
+                lit += weights.x * weights.y;
+            }
+        }
+    }
     return lit / (width * width);
 }
 
-// The receiver as the disc filters see it: texel, depth there, its slope, and tolerance per texel.
-struct Receiver {
-    t: vec2<f32>,
-    depth: f32,
-    depth_per_texel: vec2<f32>,
-    tolerance: f32,
-};
+fn hides(face: MapFace, r: Receiver, centre: vec2<f32>) -> bool {
+    let offset = centre - r.t;
+    let stored = stored_at(face, centre);
+    if stored <= expected_at(r, offset) + r.beside * length(offset) {
+        return false;
+    }
+    if r.steepest == 0.0 {
+        return true;
+    }
+    // The caster's slope, from the neighbours that are farther out: those towards the receiver may be the receiver.
+    let out = select(vec2<f32>(-1.0), vec2<f32>(1.0), offset > vec2<f32>(0.0));
+    let across = vec2<f32>(out.x, 0.0);
+    let along = vec2<f32>(0.0, out.y);
+    var slope = vec2<f32>(stored_at(face, centre + across), stored_at(face, centre + along)) - stored;
+    if abs(offset.x) < 0.5 {
+        slope.x = smaller(slope.x, stored - stored_at(face, centre - across));
+    }
+    if abs(offset.y) < 0.5 {
+        slope.y = smaller(slope.y, stored - stored_at(face, centre - along));
+    }
+    slope = clamp(slope, vec2<f32>(-r.steepest), vec2<f32>(r.steepest));
+    return stored - dot(slope, abs(offset)) > r.depth + r.tolerance;
+}
+
+fn smaller(a: f32, b: f32) -> f32 {
+    return select(b, a, abs(a) < abs(b));
+}
 
 const DISC_SAMPLES: u32 = 16u;
 // As wide as 16 bilinear comparisons, texels.
@@ -213,12 +283,17 @@ fn turn_at(t: vec2<f32>) -> f32 {
     return 6.2831853 * fract(52.9829189 * fract(dot(floor(t * 4.0), vec2<f32>(0.06711056, 0.00583715))));
 }
 
-// The four texels around a place, and the place between them.
+// The four texels around a place: their depths, which of them hide the receiver, and the place between them.
 struct Quad {
     stored: vec4<f32>,
-    expected: vec4<f32>,
+    hides: vec4<f32>,
     share: vec2<f32>,
 };
+
+// Texels around the receiver within which planes of casters are looked at.
+const PLANES_WITHIN: f32 = 4.0;
+// Farther out, what is so little nearer does not count either, times Receiver.steepest: the other wall of a corner.
+const FAR_STEPS: f32 = 0.5;
 
 fn quad_at(face: MapFace, r: Receiver, offset: vec2<f32>) -> Quad {
     let side = f32(face.tile.z);
@@ -226,16 +301,25 @@ fn quad_at(face: MapFace, r: Receiver, offset: vec2<f32>) -> Quad {
     let inside = clamp(corner, vec2<f32>(1.0), vec2<f32>(side - 1.0));
     let near = inside - 0.5 - r.t;
     let far = inside + 0.5 - r.t;
-    let expected = vec4<f32>(
-        dot(r.depth_per_texel, vec2<f32>(near.x, far.y)),
-        dot(r.depth_per_texel, far),
-        dot(r.depth_per_texel, vec2<f32>(far.x, near.y)),
-        dot(r.depth_per_texel, near),
-    );
     let place = (inside + vec2<f32>(face.tile.xy)) / vec2<f32>(textureDimensions(maps));
     let stored = textureGather(maps, maps_sampler, place, face.tile.w);
+    // Order of textureGather: (near, far), (far, far), (far, near), (near, near).
+    let x = vec4<f32>(near.x, far.x, far.x, near.x);
+    let y = vec4<f32>(far.y, far.y, near.y, near.y);
+    var expected = r.depth + r.tolerance + r.depth_per_texel.x * x + r.depth_per_texel.y * y;
+    var hides = stored > expected;
+    if r.steepest > 0.0 && any(hides) {
+        let slope = 0.5 * vec2<f32>(stored.y - stored.x + stored.z - stored.w, stored.x - stored.w + stored.y - stored.z);
+        let twist = abs(stored.x - stored.y + stored.z - stored.w);
+        if length(offset) > PLANES_WITHIN {
+            hides = stored > expected + r.steepest * FAR_STEPS;
+        } else if twist <= 0.25 * (abs(slope.x) + abs(slope.y)) + r.tolerance {
+            let steep = clamp(slope, vec2<f32>(-r.steepest), vec2<f32>(r.steepest));
+            hides = hides & (stored - steep.x * x - steep.y * y > vec4<f32>(r.depth + r.tolerance));
+        }
+    }
     let share = saturate(r.t + offset + 0.5 - corner);
-    return Quad(stored, r.depth + expected + r.tolerance * (1.0 + min(length(offset), 2.0)), share);
+    return Quad(stored, select(vec4<f32>(0.0), vec4<f32>(1.0), hides), share);
 }
 
 fn disc_filtered(face: MapFace, r: Receiver, radius: f32, count: u32) -> f32 {
@@ -243,7 +327,7 @@ fn disc_filtered(face: MapFace, r: Receiver, radius: f32, count: u32) -> f32 {
     var lit = 0.0;
     for (var i = 0u; i < count; i++) {
         let q = quad_at(face, r, radius * on_disc(i, count, turn));
-        let one = select(vec4<f32>(0.0), vec4<f32>(1.0), q.stored <= q.expected);
+        let one = 1.0 - q.hides;
         // Order of textureGather: (near, far), (far, far), (far, near), (near, near).
         lit += mix(mix(one.w, one.z, q.share.x), mix(one.x, one.y, q.share.x), q.share.y);
     }
@@ -269,9 +353,8 @@ fn contact_hardening(light: Light, face: MapFace, r: Receiver) -> f32 {
     var casters = 0.0;
     for (var i = 0u; i < PENUMBRA_SAMPLES; i++) {
         let q = quad_at(face, r, search * on_disc(i, PENUMBRA_SAMPLES, turn));
-        let blocks = select(vec4<f32>(0.0), vec4<f32>(1.0), q.stored > q.expected);
-        depth += dot(blocks, q.stored);
-        casters += dot(blocks, vec4<f32>(1.0));
+        depth += dot(q.hides, q.stored);
+        casters += dot(q.hides, vec4<f32>(1.0));
     }
     if casters == 0.0 {
         // Samples so far apart miss what is thin.

@@ -137,7 +137,7 @@ fn shadows_agree_with_ray_tracing() {
     scene.ambient = Vec3::splat(0.1);
     scene.background = Background { zenith: Vec3::new(0.1, 0.2, 0.6), horizon: Vec3::splat(0.6), nadir: Vec3::splat(0.1) };
     let mut failed = Vec::new();
-    for (shadows, least) in [(ShadowMethod::Map, 0.98), (ShadowMethod::Volume, 0.9999)] {
+    for (shadows, least) in [(ShadowMethod::Map, 0.99), (ShadowMethod::Volume, 0.9999)] {
         for light in ["sun", "spot", "lamp"] {
             for camera in ["overview", "eye_level"] {
                 let name = format!("town_square__{light}__{camera}");
