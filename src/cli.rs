@@ -121,6 +121,9 @@ pub(crate) struct Run {
     /// Record the session to this file, for `replay` and `explain`
     #[arg(long)]
     pub(crate) record: Option<PathBuf>,
+    /// Run every line of standard input in the world, between frames, and print its value; with --headless one before each frame
+    #[arg(long, conflicts_with = "measure")]
+    pub(crate) console: bool,
 }
 
 #[derive(Args, Debug)]

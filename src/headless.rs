@@ -1,6 +1,7 @@
 //! Draws a world to files.
 
 use crate::cli::Run;
+use crate::console::Console;
 use crate::png;
 use crate::session::Session;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -25,6 +26,7 @@ pub(crate) fn run(args: &Run) -> Result<usize, Failure> {
         session.record(file)?;
     }
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}.png", session.name())));
+    let console = Console::open(args.console);
     if args.time > 0.0 {
         session.step(0.0); // what starts with the world starts before the jump
     }
@@ -33,12 +35,13 @@ pub(crate) fn run(args: &Run) -> Result<usize, Failure> {
         &mut session,
         0..args.frames,
         time_s,
+        console.as_ref(),
         &Wanted { view: args.view.as_deref(), size: args.size, shadow_of: args.shadow_of.as_deref(), out: &out },
     )?;
     if let Some(frames) = session.finish_recording()? {
-        println!("{frames} frames recorded");
+        say!("{frames} frames recorded");
     }
-    println!("{} pictures, the last {}", drawn.pictures, drawn.last.display());
+    say!("{} pictures, the last {}", drawn.pictures, drawn.last.display());
     Ok(drawn.problems)
 }
 
@@ -74,7 +77,7 @@ fn measure(session: &mut Session, args: &Run) -> Result<usize, Failure> {
     let (count, whole) = (frames_s.len() as f64, begin.elapsed().as_secs_f64());
     frames_s.sort_by(f64::total_cmp);
     let [step, prepare, record] = parts_s.map(|part| 1e3 * part / count);
-    println!(
+    say!(
         "{:.1} frames per second on {}: {count} frames, fastest {:.2} ms, median {:.2}, slowest {:.2}",
         count / whole,
         describe(&gpu),
@@ -82,7 +85,7 @@ fn measure(session: &mut Session, args: &Run) -> Result<usize, Failure> {
         1e3 * frames_s[frames_s.len() / 2],
         1e3 * frames_s[frames_s.len() - 1],
     );
-    println!("of a frame: world and views {step:.2} ms, renderer's lists {prepare:.2}, recording {record:.2}, the rest drawing");
+    say!("of a frame: world and views {step:.2} ms, renderer's lists {prepare:.2}, recording {record:.2}, the rest drawing");
     Ok(problems)
 }
 
@@ -110,6 +113,7 @@ pub(crate) fn draw(
     session: &mut Session,
     frames: std::ops::Range<u32>,
     time_s: impl Fn(u32) -> f64,
+    console: Option<&Console>,
     wanted: &Wanted<'_>,
 ) -> Result<Drawn, Failure> {
     if wanted.out.extension().is_some_and(|e| !e.eq_ignore_ascii_case("png")) {
@@ -124,6 +128,9 @@ pub(crate) fn draw(
     let mut is_named = None;
     let is_sequence = frames.len() > 1;
     for frame in frames {
+        if let Some(console) = console {
+            drawn.problems += console.run_next(&mut |line| session.console(line));
+        }
         session.step(time_s(frame));
         let mut pictures = pictures(session, wanted.view, wanted.size)?;
         if let Some(name) = wanted.shadow_of {

@@ -11,6 +11,7 @@ macro_rules! say {
 mod cli;
 #[cfg(feature = "cluster")]
 mod cluster;
+mod console;
 mod doctor;
 mod headless;
 mod model;

@@ -34,13 +34,13 @@ fn compare(mut replay: Replay) -> Result<usize, Failure> {
         if let Some(divergence) = replay.step()? {
             bar.finish_and_clear();
             tracing::error!("the replay differs: {divergence}");
-            println!("{} of {} frames are the same", replay.position() - first - 1, replay.frames() - first);
+            say!("{} of {} frames are the same", replay.position() - first - 1, replay.frames() - first);
             return Ok(1);
         }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    println!("{} frames replayed, all values the same bit by bit", replay.frames() - first);
+    say!("{} frames replayed, all values the same bit by bit", replay.frames() - first);
     Ok(0)
 }
 
@@ -49,7 +49,7 @@ fn draw(replay: Replay, args: &cli::Replay, out: &Path) -> Result<usize, Failure
     let mut session = Session::replay(replay, &args.file).wait_for_casters();
     let wanted = headless::Wanted { view: args.view.as_deref(), size: args.size, shadow_of: None, out };
     // A recording has its own times.
-    Ok(headless::draw(&mut session, frames, |_| 0.0, &wanted)?.problems)
+    Ok(headless::draw(&mut session, frames, |_| 0.0, None, &wanted)?.problems)
 }
 
 /// Tells why a field holds what it holds, what nodes cost, or what is in the recording.

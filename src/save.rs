@@ -22,6 +22,6 @@ pub(crate) fn run(args: &Save) -> Result<usize, Box<dyn std::error::Error>> {
     if folder(&out) != folder(&args.path) {
         tracing::warn!("{}: the script and pictures of the world will be looked for beside it", out.display());
     }
-    println!("{} nodes, {} bytes: {}", session.graph().node_count(), bytes.len(), out.display());
+    say!("{} nodes, {} bytes: {}", session.graph().node_count(), bytes.len(), out.display());
     Ok(problems.len())
 }

@@ -149,6 +149,14 @@ impl Session {
         }
     }
 
+    /// Runs a text in the world, as part of its script; gives its value as text, or what is wrong with it.
+    pub(crate) fn console(&mut self, text: &str) -> Result<String, String> {
+        match &mut self.source {
+            Source::World(world) => world.console(text).map_err(|problem| problem.to_string()),
+            Source::Replay(_) => Err("a recording runs no scripts".to_owned()),
+        }
+    }
+
     /// The world as a file; None for a recording.
     pub(crate) fn save(&mut self, form: SaveForm) -> Result<Option<Vec<u8>>, umbriel_fields::Error> {
         match &mut self.source {

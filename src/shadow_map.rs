@@ -36,7 +36,7 @@ pub(crate) fn run(args: &ShadowMap) -> Result<usize, Failure> {
     let maps: Vec<RgbaPixels> = renderer.shadow_map_picture(index)?.into_iter().map(opaque).collect();
     let out = args.out.clone().unwrap_or_else(|| format!("{}.shadow_map.png", session.name()).into());
     png::write(&out, &png::row(&maps), &describe(&gpu))?;
-    println!("{} of light '{}', {} texels wide: {}", count(maps.len()), light.name, maps[0].width, out.display());
+    say!("{} of light '{}', {} texels wide: {}", count(maps.len()), light.name, maps[0].width, out.display());
     let problems: Vec<String> = session.problems_with(renderer.problems());
     problems.iter().for_each(|problem| tracing::error!("{problem}"));
     Ok(problems.len())

@@ -1,6 +1,7 @@
 //! Shows a world in windows.
 
 use crate::cli::{Replay, Run};
+use crate::console::Console;
 use crate::headless::DESKTOP_SIZE;
 use crate::png;
 use crate::session::Session;
@@ -19,22 +20,24 @@ pub(crate) fn run(args: &Run) -> Result<(), Box<dyn std::error::Error>> {
     }
     session.step(args.time);
     session.pictures(args.view.as_deref(), DESKTOP_SIZE, &WindowSizes::new())?; // a wrong --view ends here
-    let mut viewer = Viewer { session, view: args.view.clone(), size: args.size, watched: Vec::new() };
+    let console = Console::open(args.console);
+    let mut viewer = Viewer { session, console, view: args.view.clone(), size: args.size, watched: Vec::new() };
     let shown = window::run(&mut viewer, Options { start_s: args.time, ..Options::default() });
     if let Some(frames) = viewer.session.finish_recording()? {
-        println!("{frames} frames recorded");
+        say!("{frames} frames recorded");
     }
     Ok(shown?)
 }
 
 /// Shows a recording; it stays at its last frame.
 pub(crate) fn replay(session: Session, args: &Replay) -> Result<(), Box<dyn std::error::Error>> {
-    let mut viewer = Viewer { session, view: args.view.clone(), size: args.size, watched: Vec::new() };
+    let mut viewer = Viewer { session, console: None, view: args.view.clone(), size: args.size, watched: Vec::new() };
     Ok(window::run(&mut viewer, Options::default())?)
 }
 
 struct Viewer {
     session: Session,
+    console: Option<Console>,
     view: Option<String>,
     size: Option<[u32; 2]>,
     watched: Vec<PathBuf>,
@@ -63,6 +66,9 @@ impl App for Viewer {
     type Error = umbriel_displays::Error;
 
     fn turn(&mut self, time_s: f64, stage: &mut Stage<'_>) -> Result<(), umbriel_displays::Error> {
+        if let Some(console) = &self.console {
+            console.run_all(&mut |line| self.session.console(line));
+        }
         if !self.session.is_over() {
             self.session.step(time_s);
         }

@@ -1,6 +1,6 @@
 //! The command line: what it prints, and what it says of bad input. One bad thing costs no more than itself.
 
-use crate::support::{root, umbriel};
+use crate::support::{root, umbriel, umbriel_told};
 use std::path::{Path, PathBuf};
 
 fn folder(name: &str) -> PathBuf {
@@ -317,6 +317,23 @@ fn frames_are_numbered_and_follow_the_clock() {
     let places = [0, 1, 2].map(place);
     let steps = [places[1] - places[0], places[2] - places[1]];
     assert!(steps.iter().all(|s| *s > 5.0) && (steps[0] - steps[1]).abs() < 2.0, "{places:?}");
+}
+
+/// One line before each frame: values are printed, what is written is drawn, and a mistake costs its line.
+#[test]
+fn lines_of_the_console_run_in_the_world() {
+    let world = folder("command").join("console.rhai");
+    let script = format!("{BACKDROP}\nlet ball = transform(#{{ name: \"ball\" }}); let n = 1; on_frame(|t| {{ n += 1; }});");
+    std::fs::write(&world, script).expect("a world can be written");
+    let out = world.with_extension("png");
+    let [path, picture] = [&world, &out].map(|p| p.to_str().expect("paths are text"));
+    let args = ["run", path, "--headless", "--size", "96x64", "--frames", "7", "--console", "--out", picture];
+    let lines =
+        "ball.translation.y = 2; let more = 5;\nball.translation\nball.translaton\nfn twice(x) { 2 * x }\n\n[twice(more), n]\n";
+    let run = umbriel_told(&args, lines);
+    assert!(run.stdout.starts_with("vec3(0, 2, 0)\n[10, 6]\n") && run.stdout.contains("7 pictures"), "{}", run.stdout);
+    let words = "console:1:6: `ball` (Transform) has no field `translaton`; did you mean `translation`?";
+    assert!(!run.ok && run.stderr.contains(words) && run.stderr.contains("with 1 problem"), "{}", run.stderr);
 }
 
 /// Text and bytes: the frame that a saved world shows is the one that the world would have shown.

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use rhai::{Dynamic, EvalAltResult, Position};
+use rhai::{Dynamic, EvalAltResult, ParseErrorType, Position};
 use umbriel_fields::nearest;
 
 use crate::source::Source;
@@ -149,6 +149,10 @@ pub(crate) fn problem_from(error: &EvalAltResult, source: &Source, known: &dyn K
         ),
         EvalAltResult::ErrorStackOverflow(_) => Fault::new("functions call each other too deeply"),
         EvalAltResult::ErrorDotExpr(text, _) => Fault::new(no_part(text)),
+        EvalAltResult::ErrorParsing(ParseErrorType::AssignmentToInvalidLHS(_), _) => Fault::new(
+            "only a variable and its fields can be assigned to: write `let lamp = find(\"lamp\"); lamp.on = true` instead of \
+             `find(\"lamp\").on = true`",
+        ),
         other => Fault::new(text_without_place(other)),
     };
     Problem { message: fault.message, file, line, column, node: fault.node, field: fault.field, calls }

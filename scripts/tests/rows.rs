@@ -88,6 +88,7 @@ fn errors() {
         ("shape(1);", &["test:1:1", "does not take (int)", "shape(geometry: Node)"]),
         ("let lamp = 1;\nprint(lamb);", &["test:2:", "no variable `lamb`", "did you mean `lamp`"]),
         ("let x = 1;\nlet y = ;", &["test:2:", "Syntax error"]),
+        ("let l = make(\"SpotLight\", #{ name: \"l\" });\nfind(\"l\").on = false;", &["test:2:", "let lamp = find(\"lamp\");"]),
         (
             "fn a() { b(); }\nfn b() { make(\"Nothing\"); }\n\na();",
             &["test:2:", "Nothing", "in b, called in test:1", "in a, called in test:4"],

@@ -47,6 +47,9 @@ pub(crate) struct Serve {
     /// How long a frame waits for a display, in milliseconds
     #[arg(long, default_value_t = 200)]
     pub(crate) timeout_ms: u64,
+    /// Run every line of standard input in the world, between frames, and print its value
+    #[arg(long)]
+    pub(crate) console: bool,
 }
 
 #[derive(Args, Debug)]
@@ -70,6 +73,9 @@ pub(crate) struct Join {
     /// End when the other application ends, instead of waiting for it to come back
     #[arg(long)]
     pub(crate) once: bool,
+    /// Run every line of standard input as part of the script, between frames, and print its value
+    #[arg(long)]
+    pub(crate) console: bool,
 }
 
 /// What becomes of the nodes of an application that ends.

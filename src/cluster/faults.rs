@@ -104,7 +104,7 @@ impl Plan {
         let Some(random) = &mut self.random else { return Ok(()) };
         if random.told_memory.is_none_or(|told| told.elapsed() > TELLS_MEMORY) {
             random.told_memory = Some(Instant::now());
-            println!("frame {frame}: resident {}", resident(processes));
+            say!("frame {frame}: resident {}", resident(processes));
         }
         if self.open.is_empty() && Instant::now() > random.rests_until && !random.is_over() {
             let (seed, fault) = random.next(frame);
@@ -137,7 +137,7 @@ impl Plan {
         for open in self.open.extract_if(.., is_over) {
             let is_back = live.contains(&open.fault.display);
             self.failures += !is_back as usize;
-            println!("{}", outcome(&open, host, is_back));
+            say!("{}", outcome(&open, host, is_back));
             if let Some(random) = &mut self.random {
                 random.rests_until = Instant::now() + REST;
             }

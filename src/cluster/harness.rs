@@ -72,12 +72,12 @@ pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
         serve::step(&mut session, &mut once, &mut host, (frame - 1) as f64 / args.fps, is_last);
         plan.watch(&host, &processes)?;
     }
-    println!("{}", serve::summary(&host));
+    say!("{}", serve::summary(&host));
     let disagreed = host.report().disagreed as usize + plan.failures();
     drop(host);
     for process in processes {
         let output = process.child.wait_with_output()?;
-        println!("{}: {}", process.show, String::from_utf8_lossy(&output.stdout).trim());
+        say!("{}: {}", process.show, String::from_utf8_lossy(&output.stdout).trim());
     }
     let different = if args.check { compare(args, &shows, &folder, frame)? } else { 0 };
     if args.out.is_none() {
@@ -225,7 +225,7 @@ fn compare(args: &cli::Cluster, shows: &[String], folder: &Path, frames: u64) ->
         if args.channels {
             print!("; in one picture of all, {} of {} pixels by at most {}/255", beside.0, beside.1, beside.2);
         }
-        println!();
+        say!("");
         wrong += different + (compared == 0) as usize;
         if !args.breaks() && compared as u64 + 1 != frames {
             tracing::error!("{show}: {} of {} pictures are missing", frames - 1 - compared as u64, frames - 1);

@@ -3,6 +3,7 @@
 use super::interrupt::Interrupt;
 use super::{Failure, security};
 use crate::cli::{self, OnLeave};
+use crate::console::Console;
 use crate::session::folder_of;
 use std::time::{Duration, Instant};
 use umbriel_displays::cluster::{ClusterError, Guest, News, Whose, Wish};
@@ -24,6 +25,7 @@ pub(crate) fn join(args: &cli::Join) -> Result<usize, Failure> {
     let keeps = args.on_leave == OnLeave::Keep;
     let mut guest = Guest::connect(&args.connect, &security(&args.link), &name, keeps, shared_graph)?;
     let interrupt = Interrupt::watch()?;
+    let console = Console::open(args.console);
     let started = Instant::now();
     let mut embedder = Embedder::new(folder_of(&args.path));
     let (mut world, mut frames, mut problems, mut is_told): (Option<World>, u64, usize, bool) = (None, 0, 0, false);
@@ -56,6 +58,9 @@ pub(crate) fn join(args: &cli::Join) -> Result<usize, Failure> {
                 let Some(world) = &mut world else { continue };
                 frames += 1;
                 follow(&mut guest, world);
+                if let Some(console) = &console {
+                    problems += console.run_all(&mut |line| world.console(line).map_err(|problem| problem.to_string()));
+                }
                 world.step_shared(time_s);
                 tell(&mut guest, world, &mut embedder);
                 problems += report(world);
@@ -63,7 +68,7 @@ pub(crate) fn join(args: &cli::Join) -> Result<usize, Failure> {
         }
     }
     guest.leave();
-    println!("frames={frames}");
+    say!("frames={frames}");
     Ok(problems)
 }
 

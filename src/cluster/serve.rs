@@ -4,6 +4,7 @@ use super::interrupt::Interrupt;
 use super::maps_once::MapsOnce;
 use super::{Failure, security};
 use crate::cli;
+use crate::console::Console;
 use crate::session::Session;
 use std::time::{Duration, Instant};
 use umbriel_displays::cluster::{Desk, Event, Host, HostOptions};
@@ -20,18 +21,22 @@ pub(crate) fn serve(args: &cli::Serve) -> Result<usize, Failure> {
     let mut host = Host::listen(&options)?;
     let mut desk = Desk::open(&host, &session.name())?;
     let interrupt = Interrupt::watch()?;
-    println!("{} is served at {}", session.name(), args.listen);
+    say!("{} is served at {}", session.name(), args.listen);
     let mut once = MapsOnce::default();
     let mut problems = begin(&mut session, &mut once, &mut host, args.wait_for, &mut || Ok(()))?;
+    let console = Console::open(args.console);
     let (started, mut frame) = (Instant::now(), 1u64);
     while args.frames.is_none_or(|frames| frame < frames) && !interrupt.came() {
         let next = started + Duration::from_secs_f64(frame as f64 / args.fps);
         host.wait_until(session.graph(), next);
         frame += 1;
+        if let Some(console) = &console {
+            problems += console.run_all(&mut |line| session.console(line));
+        }
         let is_last = args.frames == Some(frame) || interrupt.came();
         problems += step_with(&mut session, &mut once, &mut host, Some(&mut desk), started.elapsed().as_secs_f64(), is_last);
     }
-    println!("{}", summary(&host));
+    say!("{}", summary(&host));
     Ok(problems)
 }
 

@@ -7,6 +7,7 @@ pub(crate) mod screen;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 /// The root of the repository.
@@ -43,8 +44,16 @@ pub(crate) struct Run {
 
 /// Runs the `umbriel` command to its end.
 pub(crate) fn umbriel(args: &[&str]) -> Run {
-    let output =
-        std::process::Command::new(env!("CARGO_BIN_EXE_umbriel")).args(args).output().expect("the command can be started");
+    umbriel_told(args, "")
+}
+
+/// Runs the `umbriel` command to its end, with a short text to read.
+pub(crate) fn umbriel_told(args: &[&str], input: &str) -> Run {
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_umbriel"));
+    command.args(args).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the command can be started");
+    let _ = child.stdin.take().expect("it has an input").write_all(input.as_bytes()); // who does not read it may be gone
+    let output = child.wait_with_output().expect("the command ends");
     Run {
         ok: output.status.success(),
         stdout: String::from_utf8_lossy(&output.stdout).into_owned(),

@@ -115,7 +115,11 @@ impl fmt::Display for Findings {
             write!(f, ", genus {genus}")?;
         }
         if let Some(volume) = self.volume_m3 {
-            write!(f, ", {volume:.6} m3")?;
+            let inside_out = if volume < 0.0 { ", inside out" } else { "" };
+            match volume.abs() {
+                0.0 | 1e-3..1e9 => write!(f, ", {volume:.6} m3{inside_out}")?,
+                _ => write!(f, ", {volume:.6e} m3{inside_out}")?,
+            }
         }
         write!(f, "\nclosed {}, ", yes(self.is_closed()))?;
         write!(f, "two-manifold {}, oriented {}", yes(self.is_two_manifold()), yes(self.is_oriented()))?;

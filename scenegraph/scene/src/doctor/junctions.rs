@@ -2,6 +2,7 @@
 
 use super::soup::{Extra, Soup};
 use crate::adjacency::Edges;
+use glam::Vec3;
 use std::collections::HashMap;
 
 /// Rounds of stitching; one triangle may have junctions on several sides.
@@ -17,9 +18,9 @@ pub(super) fn find(soup: &Soup, edges: &Edges) -> (HashMap<usize, Vec<(f64, u32)
     corners.sort_unstable();
     corners.dedup();
     // By each axis, so that every edge looks along the one on which least lies beside it.
-    let sorted: [Vec<(f32, u32)>; 3] = std::array::from_fn(|axis| {
-        let mut list: Vec<(f32, u32)> = corners.iter().map(|c| (soup.places[*c as usize][axis], *c)).collect();
-        list.sort_by(|x, y| x.0.total_cmp(&y.0));
+    let sorted: [Vec<(Vec3, u32)>; 3] = std::array::from_fn(|axis| {
+        let mut list: Vec<(Vec3, u32)> = corners.iter().map(|c| (soup.places[*c as usize], *c)).collect();
+        list.sort_by(|x, y| x.0[axis].total_cmp(&y.0[axis]));
         list
     });
     let slack = 1e-6 * soup.radius;
@@ -28,9 +29,10 @@ pub(super) fn find(soup: &Soup, edges: &Edges) -> (HashMap<usize, Vec<(f64, u32)
     for e in open {
         let edge = &edges.edges[e];
         let (a, b) = (soup.places[edge.a as usize], soup.places[edge.b as usize]);
+        let (low, high) = (a.min(b) - slack, a.max(b) + slack);
         let range = |axis: usize| {
-            let (low, high) = (a[axis].min(b[axis]) - slack, a[axis].max(b[axis]) + slack);
-            sorted[axis].partition_point(|(x, _)| *x < low)..sorted[axis].partition_point(|(x, _)| *x <= high)
+            let list = &sorted[axis];
+            list.partition_point(|(p, _)| p[axis] < low[axis])..list.partition_point(|(p, _)| p[axis] <= high[axis])
         };
         let (axis, candidates) = (0..3).map(|axis| (axis, range(axis))).min_by_key(|(_, r)| r.len()).unwrap_or((0, 0..0));
         let Some(left) = budget.checked_sub(candidates.len()) else {
@@ -40,8 +42,9 @@ pub(super) fn find(soup: &Soup, edges: &Edges) -> (HashMap<usize, Vec<(f64, u32)
         budget = left;
         let (from, way) = (a.as_dvec3(), (b - a).as_dvec3());
         let mut on: Vec<(f64, u32)> = Vec::new();
-        for (_, corner) in sorted[axis][candidates].iter().filter(|(_, c)| *c != edge.a && *c != edge.b) {
-            let offset = soup.places[*corner as usize].as_dvec3() - from;
+        let beside = sorted[axis][candidates].iter().filter(|(p, _)| p.cmpge(low).all() && p.cmple(high).all());
+        for (place, corner) in beside.filter(|(_, c)| *c != edge.a && *c != edge.b) {
+            let offset = place.as_dvec3() - from;
             let share = offset.dot(way) / way.length_squared();
             if share > 0.0 && share < 1.0 && (offset - share * way).length() <= f64::from(slack) {
                 on.push((share, *corner));
