@@ -52,8 +52,18 @@ impl Graph {
     }
 
     /// Writes a field. A value of another type is converted where [`crate::converts`] allows it; an enum takes its names and numbers too.
+    #[inline]
     pub fn set(&mut self, field: FieldId, value: impl Into<Value>) -> Result<(), Error> {
-        self.set_value(field, value.into())
+        let value = value.into();
+        match self.write_plain(field, &value) {
+            Some(written) => {
+                if written {
+                    self.wrote(field);
+                }
+                Ok(())
+            }
+            None => self.set_value(field, value),
+        }
     }
 
     /// Writes a field by its name.
@@ -64,11 +74,39 @@ impl Graph {
     /// Writes a field; see [`Graph::set`].
     pub fn set_value(&mut self, field: FieldId, value: Value) -> Result<(), Error> {
         if self.write(field, &value)? {
-            self.schedule.mark(slot_of(field.node));
+            self.wrote(field);
+        }
+        Ok(())
+    }
+
+    /// The consequences of a write.
+    #[inline]
+    fn wrote(&mut self, field: FieldId) {
+        self.schedule.mark(slot_of(field.node));
+        if self.journal.is_some() || self.explain.is_some() {
             self.note_write(field, false);
             self.explain_write(field);
         }
-        Ok(())
+    }
+
+    /// Writes without asking for a turn, as nearly all writes are: to a declared field, whose type the value has, with nothing to be
+    /// checked. Says whether anything was written; `None` if the write is not like that. Where the type is known to the compiler,
+    /// little is left of this.
+    #[inline(always)]
+    fn write_plain(&mut self, field: FieldId, value: &Value) -> Option<bool> {
+        let node = self.nodes.get(field.node)?;
+        let declared = node.node_type.fields.get(field.index as usize)?;
+        if !declared.takes_all_of(value.field_type()) {
+            return None;
+        }
+        let slot = *node.slots.get(field.index as usize)?;
+        let revision = self.changes.last() + 1;
+        let written = self.columns.write(slot, value, declared.on_set == SetRule::Compare, revision);
+        if written {
+            self.changes.next();
+            self.changes.wrote(slot_of(field.node), revision);
+        }
+        Some(written)
     }
 
     /// Writes a field without consequences: no evaluation, no callback, no route. Readers of revisions see it.
@@ -104,9 +142,7 @@ impl Graph {
     fn write(&mut self, field: FieldId, value: &Value) -> Result<bool, Error> {
         let (declared, slot) = self.place(field)?;
         let compare = declared.on_set == SetRule::Compare;
-        let fits =
-            declared.field_type == value.field_type() && declared.field_type.kind != Kind::Enum && declared.range.is_none();
-        let converted = if fits { None } else { self.fitting(field, declared, value)? };
+        let converted = if declared.takes_all_of(value.field_type()) { None } else { self.fitting(field, declared, value)? };
         let revision = self.changes.last() + 1;
         let written = self.columns.write(slot, converted.as_ref().unwrap_or(value), compare, revision);
         if written {

@@ -62,6 +62,12 @@ impl Field {
         }
     }
 
+    /// True if every value of a type can be written as it is.
+    #[inline]
+    pub(crate) fn takes_all_of(&self, field_type: FieldType) -> bool {
+        self.field_type == field_type && field_type.kind != Kind::Enum && self.range.is_none()
+    }
+
     /// A field of a type that is known only at run time. For an enum use [`Field::choice`].
     pub fn of_type(name: impl AsRef<str>, field_type: FieldType) -> Self {
         Self::new(name, Value::empty(field_type))

@@ -95,6 +95,7 @@ macro_rules! values {
 
         impl Value {
             /// The type of the field that holds this value without conversion.
+            #[inline]
             pub const fn field_type(&self) -> FieldType {
                 match self { $(
                     Value::$one(_) => FieldType::one(Kind::$one),
@@ -148,6 +149,7 @@ macro_rules! values {
 
         $(
             impl From<$type> for Value {
+                #[inline]
                 fn from(value: $type) -> Value { Value::$one(value) }
             }
             impl From<Arc<[$type]>> for Value {
