@@ -1,5 +1,5 @@
 //! An application and four display processes on loopback: `cargo bench -p umbriel-displays --features cluster --bench distribution`;
-//! `-- --displays 1` for another number of them.
+//! `-- --displays 1` for another number of them, `-- --frames 3000` for longer rows.
 //!
 //! Each frame writes translation, rotation and scale of 10 000 transforms, or of one. Displays apply and verify them, and draw nothing. The
 //! measure beside it is TCP that sends the same bytes to four processes, each of which answers with one byte.
@@ -17,7 +17,9 @@ use umbriel_scenegraph::{new_graph, node_types};
 
 const TRANSFORMS: usize = 10_000;
 const FIELDS: usize = 3;
-/// Frames that are measured in each row.
+/// Of a display: leaves the application's memory alone, as if it were on another machine.
+const OVER_NETWORK: &str = "--over-network";
+/// Frames that are measured in each row, unless told otherwise.
 const FRAMES: usize = 300;
 const TIMEOUT: Duration = Duration::from_secs(5);
 
@@ -43,8 +45,11 @@ fn main() -> Result<(), Failure> {
         return raw_display(&address);
     }
     match (place("--display"), place("--name")) {
-        (Some(endpoint), Some(name)) => display(endpoint, &name),
-        _ => application(place("--displays").map_or(Ok(4), |count| count.parse())?),
+        (Some(endpoint), Some(name)) => display(endpoint, &name, !args.iter().any(|arg| arg == OVER_NETWORK)),
+        _ => {
+            let number = |name: &str, default: usize| place(name).map_or(Ok(default), |number| number.parse());
+            application(number("--displays", 4)?, number("--frames", FRAMES)?)
+        }
     }
 }
 
@@ -56,9 +61,10 @@ fn free_address() -> Result<String, Failure> {
     Ok(TcpListener::bind("127.0.0.1:0")?.local_addr()?.to_string())
 }
 
-fn display(endpoint: String, name: &str) -> Result<(), Failure> {
+fn display(endpoint: String, name: &str, uses_memory: bool) -> Result<(), Failure> {
     let types: Vec<NodeType> = node_types().into_iter().chain(builtin_types()).collect();
-    let options = FollowerOptions { endpoint, security: Security::Loopback, lease: LEASE, ends_with_application: true };
+    let options =
+        FollowerOptions { endpoint, security: Security::Loopback, lease: LEASE, ends_with_application: true, uses_memory };
     let mut follower = Follower::connect(options, name, TypeRegistry::from(types))?;
     while !follower.is_over() {
         follower.run(&mut Blind, Duration::from_millis(50))?;
@@ -135,40 +141,58 @@ fn parts() -> Result<(), Failure> {
     Ok(())
 }
 
-fn application(display_count: usize) -> Result<(), Failure> {
+fn application(display_count: usize, frames: usize) -> Result<(), Failure> {
     parts()?;
+    let fast = ("10 000 transforms, as fast as can be", TRANSFORMS, Duration::ZERO);
+    let at_60_hz = Duration::from_micros(16_667);
+    println!("displays of this machine, which read frames out of the application's memory:");
+    let rows = [fast, ("10 000 transforms at 60 Hz", TRANSFORMS, at_60_hz), ("one transform at 60 Hz", 1, at_60_hz)];
+    let bytes_of_frame = cluster(display_count, true, frames, &rows)?;
+    raw(bytes_of_frame, display_count, frames)?;
+    println!("the same over the network:");
+    cluster(display_count, false, frames, &rows)?;
+    raw(bytes_of_frame, display_count, frames)
+}
+
+/// Runs an application and its displays, and tells how each row went: what it is, transforms of a frame, and time of a frame. Gives the
+/// bytes of the largest frame.
+fn cluster(display_count: usize, uses_memory: bool, frames: usize, rows: &[(&str, usize, Duration)]) -> Result<usize, Failure> {
     let (mut graph, fields) = world()?;
     let endpoint = format!("tcp/{}", free_address()?);
-    let mut host =
-        Host::listen(&HostOptions { listen: endpoint.clone(), security: Security::Loopback, timeout: TIMEOUT, lease: LEASE })?;
+    let mut host = Host::listen(&HostOptions {
+        listen: endpoint.clone(),
+        security: Security::Loopback,
+        timeout: TIMEOUT,
+        lease: LEASE,
+        ahead: true,
+    })?;
     let mut displays = Vec::new();
     for number in 0..display_count {
-        displays.push(again(&["--display", &endpoint, "--name", &number.to_string()])?);
+        let number = number.to_string();
+        let args = ["--display", &endpoint, "--name", &number, OVER_NETWORK];
+        displays.push(again(&args[..args.len() - usize::from(uses_memory)])?);
     }
     host.frame(&graph, false);
     while host.in_time() < display_count {
         host.wait_until(&graph, Instant::now() + Duration::from_millis(10));
     }
     let mut bytes_of_frame = 0;
-    for (label, count, period) in [
-        ("10 000 transforms, as fast as can be", TRANSFORMS, Duration::ZERO),
-        ("10 000 transforms at 60 Hz", TRANSFORMS, Duration::from_micros(16_667)),
-        ("one transform at 60 Hz", 1, Duration::from_micros(16_667)),
-    ] {
-        let (bytes, waits) = (host.report().bytes, host.report().waits.clone());
+    for (label, count, period) in rows {
+        let before = host.report();
         let started = Instant::now();
-        for frame in 0..FRAMES {
-            write(&mut graph, &fields[..count], frame)?;
+        for frame in 0..frames {
+            write(&mut graph, &fields[..*count], frame)?;
             host.frame(&graph, false);
             if !period.is_zero() {
-                host.wait_until(&graph, started + period * (frame as u32 + 1));
+                host.wait_until(&graph, started + *period * (frame as u32 + 1));
             }
         }
-        let bytes = (host.report().bytes - bytes) as f64 / FRAMES as f64;
-        bytes_of_frame = bytes_of_frame.max(bytes as usize);
         let took = started.elapsed();
-        let waits = host.report().waits.since(&waits);
-        tell(label, took, bytes, (display_count, count), [0.5, 0.99].map(|part| waits.quantile(part)));
+        let report = host.report();
+        let bytes = (report.bytes - before.bytes) as f64 / (report.frames - before.frames) as f64;
+        bytes_of_frame = bytes_of_frame.max(bytes as usize);
+        let waits = report.waits.since(&before.waits);
+        tell(label, (frames, took), bytes, (display_count, *count), [0.5, 0.99].map(|part| waits.quantile(part)));
     }
     host.frame(&graph, true);
     println!("left behind: {}, disagreed: {}", host.report().dropped, host.report().disagreed);
@@ -176,10 +200,10 @@ fn application(display_count: usize) -> Result<(), Failure> {
     for mut child in displays {
         child.wait()?;
     }
-    raw(bytes_of_frame, display_count)
+    Ok(bytes_of_frame)
 }
 
-fn raw(bytes: usize, display_count: usize) -> Result<(), Failure> {
+fn raw(bytes: usize, display_count: usize, frames: usize) -> Result<(), Failure> {
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let address = listener.local_addr()?.to_string();
     let mut children = Vec::new();
@@ -193,7 +217,7 @@ fn raw(bytes: usize, display_count: usize) -> Result<(), Failure> {
     let packet = [&(bytes as u64).to_le_bytes()[..], &vec![7; bytes]].concat();
     let mut waits = Vec::new();
     let started = Instant::now();
-    for _ in 0..FRAMES {
+    for _ in 0..frames {
         let sent = Instant::now();
         for stream in &mut streams {
             stream.write_all(&packet)?;
@@ -206,7 +230,7 @@ fn raw(bytes: usize, display_count: usize) -> Result<(), Failure> {
     let took = started.elapsed();
     waits.sort_unstable();
     let quantiles = [waits[waits.len() / 2], waits[waits.len() * 99 / 100]];
-    tell("raw TCP, the same bytes", took, bytes as f64, (display_count, TRANSFORMS), quantiles);
+    tell("raw TCP, the same bytes", (frames, took), bytes as f64, (display_count, TRANSFORMS), quantiles);
     drop(streams);
     for mut child in children {
         child.wait()?;
@@ -214,9 +238,15 @@ fn raw(bytes: usize, display_count: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-fn tell(label: &str, took: Duration, bytes: f64, (displays, transforms): (usize, usize), waits: [Duration; 2]) {
+fn tell(
+    label: &str,
+    (frames, took): (usize, Duration),
+    bytes: f64,
+    (displays, transforms): (usize, usize),
+    waits: [Duration; 2],
+) {
     let [half, most] = waits.map(|wait| wait.as_secs_f64() * 1e3);
-    let rate = FRAMES as f64 / took.as_secs_f64();
+    let rate = frames as f64 / took.as_secs_f64();
     println!(
         "{label}: {rate:.0} frames/s, {bytes:.0} bytes a frame, {:.0} MB/s to all, {:.2} million updates/s at each, barrier p50 {half:.2} ms, p99 {most:.2} ms",
         rate * bytes * displays as f64 * 1e-6,

@@ -35,7 +35,8 @@ impl Screen for Seen {
 }
 
 fn join(endpoint: &str, security: Security, name: &str) -> Result<Follower, ClusterError> {
-    let options = FollowerOptions { endpoint: endpoint.into(), security, lease: LEASE, ends_with_application: false };
+    let options =
+        FollowerOptions { endpoint: endpoint.into(), security, lease: LEASE, ends_with_application: false, uses_memory: true };
     Follower::connect(options, name, types())
 }
 
@@ -60,7 +61,8 @@ fn serve(endpoint: &str, security: Security, end: &AtomicBool) -> Host {
     let mut graph = new_graph();
     let turner = graph.create("Transform").unwrap();
     graph.set_name(turner, "turner").unwrap();
-    let options = HostOptions { listen: endpoint.into(), security, timeout: Duration::from_millis(500), lease: LEASE };
+    let options =
+        HostOptions { listen: endpoint.into(), security, timeout: Duration::from_millis(500), lease: LEASE, ahead: true };
     let mut host = Host::listen(&options).unwrap();
     let mut frame = 0;
     while !end.load(Ordering::Relaxed) {
@@ -185,6 +187,56 @@ fn events_of_displays_reach_the_application_once_and_in_order() {
         end.store(true, Ordering::Relaxed);
         host.join().unwrap();
         assert_eq!(scale, 61.0);
+    });
+}
+
+#[test]
+fn frames_come_out_of_memory_only_while_the_line_stands() {
+    let port = free_port();
+    let proxy = Proxy::start(std::net::SocketAddr::from(([127, 0, 0, 1], port))).unwrap();
+    let end = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let host = scope.spawn(|| serve(&format!("tcp/127.0.0.1:{port}"), Security::Loopback, &end));
+        let through = |uses_memory: bool, name: &str| {
+            let endpoint = format!("tcp/127.0.0.1:{}", proxy.port());
+            let options = FollowerOptions {
+                endpoint,
+                security: Security::Loopback,
+                lease: LEASE,
+                ends_with_application: false,
+                uses_memory,
+            };
+            Follower::connect(options, name, types()).unwrap()
+        };
+        let (mut near, mut far) = (through(true, "near"), through(false, "far"));
+        let (mut seen, mut seen_far) = (Seen::default(), Seen::default());
+        let mut both = |lasts: Duration| {
+            let started = Instant::now();
+            while started.elapsed() < lasts {
+                near.run(&mut seen, Duration::from_millis(2)).unwrap();
+                far.run(&mut seen_far, Duration::from_millis(2)).unwrap();
+            }
+            let replica = |display: &Follower| display.replica().map_or(0, |replica| replica.frame());
+            ([replica(&near), replica(&far)], [near.reads_memory(), far.reads_memory()], [seen.shown.len(), seen_far.shown.len()])
+        };
+        let mut found = both(Duration::from_millis(100));
+        let started = Instant::now();
+        while found.2.iter().any(|shown| *shown < 5) && started.elapsed() < Duration::from_secs(10) {
+            found = both(Duration::from_millis(50));
+        }
+        proxy.cut(LEASE - Duration::from_millis(200));
+        // What was on its way.
+        let before = both(Duration::from_millis(50)).0;
+        let during = both(Duration::from_millis(600)).0;
+        let after = both(Duration::from_millis(900));
+        end.store(true, Ordering::Relaxed);
+        let host = host.join().unwrap();
+        assert_eq!(found.1, [cfg!(target_os = "linux"), false]);
+        assert_eq!(before, during, "the application went on without them, to frame {}", host.last_frame());
+        assert!(after.0.iter().all(|frame| *frame > during[0]), "{after:?}");
+        assert_eq!(after.1, found.1);
+        assert!(seen.shown.iter().chain(&seen_far.shown).all(|(frame, x)| *x == *frame as f32));
+        assert_eq!(host.report().disagreed, 0);
     });
 }
 

@@ -65,6 +65,7 @@ impl Process<'_> {
             security: security(&args.link),
             lease: args.link.lease(),
             ends_with_application: args.once,
+            uses_memory: true,
         };
         Ok(Process {
             args,

@@ -208,7 +208,7 @@ fn begin(
         is_healed: false,
         was_given_up: false,
         joined: None,
-        waits: host.report().waits.clone(),
+        waits: host.report().waits,
         disagreed: host.report().disagreed,
     })
 }

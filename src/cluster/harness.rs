@@ -46,6 +46,8 @@ pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
         security: if args.netns { Security::Plain } else { Security::Loopback },
         timeout: Duration::from_millis(args.timeout_ms.unwrap_or(default_ms)),
         lease: lease(args),
+        // As `umbriel serve` does, unless each picture of each frame is to be there.
+        ahead: args.breaks(),
     };
     let mut host = Host::listen(&options)?;
     let folder = args.out.clone().unwrap_or_else(|| std::env::temp_dir().join(format!("umbriel-cluster-{}", std::process::id())));

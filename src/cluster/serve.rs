@@ -17,6 +17,7 @@ pub(crate) fn serve(args: &cli::Serve) -> Result<usize, Failure> {
         security: security(&args.link),
         timeout: Duration::from_millis(args.timeout_ms),
         lease: args.link.lease(),
+        ahead: true,
     };
     let mut host = Host::listen(&options)?;
     let mut desk = Desk::open(&host, &session.name())?;

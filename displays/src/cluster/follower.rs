@@ -10,10 +10,10 @@ use zenoh::pubsub::Publisher as ZenohPublisher;
 use zenoh::qos::{CongestionControl, Priority};
 
 use super::event::Event;
-use super::line::{Answer, Line};
+use super::line::{Answer, Line, Link};
 use super::lock::{DisplayAction, DisplayEvent, DisplayLock};
 use super::message::{
-    DISPLAY, FRAME, INPUT, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, Told, bytes_of, message_of, stamped_packet,
+    DISPLAY, INPUT, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, Told, bytes_of, message_of, stamped_packet,
 };
 use super::ordered::Outbox;
 use super::transport::{ClusterError, End, Security, network};
@@ -39,6 +39,8 @@ pub struct FollowerOptions {
     pub lease: Duration,
     /// Ends with the application, instead of waiting for it to come back.
     pub ends_with_application: bool,
+    /// Where the application runs on the same machine, frames are read out of its memory.
+    pub uses_memory: bool,
 }
 
 /// What happened to a display.
@@ -119,9 +121,10 @@ impl Follower {
     /// Joins the application, now or as soon as it is there. `name` is that of the display; `types` are those that can
     /// be drawn.
     pub fn connect(options: FollowerOptions, name: &str, types: impl Into<TypeRegistry>) -> Result<Follower, ClusterError> {
-        let subjects = [(FRAME, Arrived::Frame as fn(Vec<u8>) -> Arrived), (RELEASE, Arrived::Release)];
-        let mut line =
-            Line::open(End::Display, &options.endpoint, &options.security, options.lease, subjects, Arrived::Application)?;
+        let FollowerOptions { endpoint, security, lease, ends_with_application, uses_memory } = options;
+        let subject = (RELEASE, Arrived::Release as fn(Vec<u8>) -> Arrived);
+        let link = Link { end: End::Display, endpoint: &endpoint, security: &security, lease, uses_memory };
+        let mut line = Line::open(link, Arrived::Frame, subject, Arrived::Application)?;
         let declare = |key: &'static str| {
             let publisher = line.session.declare_publisher(key).congestion_control(CongestionControl::Drop);
             publisher.priority(Priority::RealTime).express(true).wait().map_err(network)
@@ -146,7 +149,7 @@ impl Follower {
             started: Instant::now(),
             last_shown: None,
             refused_since: None,
-            ends_with_application: options.ends_with_application,
+            ends_with_application,
             alone_since: None,
             is_over: false,
             took: Duration::ZERO,
@@ -169,6 +172,11 @@ impl Follower {
     /// True once anything came from an application.
     pub fn found_application(&self) -> bool {
         self.lock.epoch() > 0
+    }
+
+    /// True if frames are read out of the application's memory, and do not come over the network.
+    pub fn reads_memory(&self) -> bool {
+        self.line.is_near()
     }
 
     /// The world here, once it came.
@@ -205,6 +213,7 @@ impl Follower {
     pub fn run<S: Screen>(&mut self, screen: &mut S, patience: Duration) -> Result<(), S::Error> {
         let until = Instant::now() + patience;
         loop {
+            self.line.settle();
             let left = until.saturating_duration_since(Instant::now());
             if let Ok(arrived) = self.line.arrived.recv_timeout(left.min(Duration::from_millis(5))) {
                 self.handle(arrived, screen)?;
@@ -235,7 +244,8 @@ impl Follower {
                         self.step(DisplayEvent::Release { epoch, frame: 0, is_mine: false }, screen)?;
                     }
                     self.line.ask_for_bulk(missing, Arrived::Bulk);
-                    if epoch == self.lock.epoch() {
+                    // What comes again is here already.
+                    if epoch == self.lock.epoch() && self.replica.as_ref().is_none_or(|replica| frame > replica.frame()) {
                         self.packets.insert(frame, packet);
                         self.parked.push_back(Parked::Frame(epoch, frame));
                     }
@@ -286,7 +296,10 @@ impl Follower {
                 // What waits for it is of the past: a snapshot knows what is needed now.
                 self.parked.clear();
             }
-            Arrived::Application(true) => self.alone_since = None,
+            Arrived::Application(true) => {
+                self.alone_since = None;
+                self.line.begin();
+            }
             Arrived::Application(false) if self.is_over => {}
             Arrived::Application(false) => {
                 tracing::warn!("display `{}`: the application is gone; waiting for it to come back", self.name);

@@ -9,6 +9,7 @@ use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
+use super::frames::Frames;
 use super::message::{APPLICATION, BULK};
 use super::transport::{ClusterError, End, Security, network, open};
 
@@ -21,6 +22,16 @@ pub(super) type Answer = Result<Vec<u8>, String>;
 /// A subject, and what its messages arrive as.
 pub(super) type Subject<A> = (&'static str, fn(Vec<u8>) -> A);
 
+/// What a line is made of.
+pub(super) struct Link<'a> {
+    pub(super) end: End,
+    pub(super) endpoint: &'a str,
+    pub(super) security: &'a Security,
+    pub(super) lease: Duration,
+    /// Frames may be read out of the application's memory.
+    pub(super) uses_memory: bool,
+}
+
 /// A link; `A` is what arrives.
 pub(super) struct Line<A> {
     pub(super) session: Session,
@@ -30,36 +41,52 @@ pub(super) struct Line<A> {
     sender: Sender<A>,
     /// Long values that were asked for and have not come.
     asked: BTreeSet<u64>,
+    frames: Frames,
     _token: Option<LivelinessToken>,
     _subscribers: Vec<Subscriber<()>>,
 }
 
 impl<A: Send + 'static> Line<A> {
-    /// Links to an application, now or as soon as it is there. `subjects` are what it publishes, `application` tells that it came or went.
+    /// Links to an application, now or as soon as it is there. `frame` and `subject` are what it publishes, `application` tells that it came
+    /// or went.
     pub(super) fn open(
-        end: End,
-        endpoint: &str,
-        security: &Security,
-        lease: Duration,
-        subjects: [Subject<A>; 2],
+        Link { end, endpoint, security, lease, uses_memory }: Link<'_>,
+        frame: fn(Vec<u8>) -> A,
+        (key, kind): Subject<A>,
         application: fn(bool) -> A,
     ) -> Result<Line<A>, ClusterError> {
         let session = open(endpoint, security, end, lease)?;
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
         let id = since ^ (std::process::id() as u64) << 40;
         let (sender, arrived) = unbounded();
-        let mut subscribers = Vec::new();
-        for (key, kind) in subjects {
-            let sender = sender.clone();
-            let take = move |sample: Sample| drop(sender.send(kind(sample.payload().to_bytes().into_owned())));
-            subscribers.push(session.declare_subscriber(key).callback(take).wait().map_err(network)?);
-        }
+        let framed = sender.clone();
+        let frames = Frames::follow(&session, uses_memory, move |bytes| drop(framed.send(frame(bytes))))?;
+        let told = sender.clone();
+        let take = move |sample: Sample| drop(told.send(kind(sample.payload().to_bytes().into_owned())));
+        let mut subscribers = vec![session.declare_subscriber(key).callback(take).wait().map_err(network)?];
         let told = sender.clone();
         let alive = session.liveliness().declare_subscriber(APPLICATION).history(true).callback(move |sample| {
             let _ = told.send(application(sample.kind() == SampleKind::Put));
         });
         subscribers.push(alive.wait().map_err(network)?);
-        Ok(Line { session, id, arrived, sender, asked: BTreeSet::new(), _token: None, _subscribers: subscribers })
+        Ok(Line { session, id, arrived, sender, asked: BTreeSet::new(), frames, _token: None, _subscribers: subscribers })
+    }
+
+    /// Keeps the one way of frames that works. To be called in each turn.
+    pub(super) fn settle(&mut self) {
+        if let Err(error) = self.frames.settle() {
+            tracing::debug!("cannot follow: {error}");
+        }
+    }
+
+    /// True if frames come out of the application's memory.
+    pub(super) fn is_near(&self) -> bool {
+        self.frames.is_near()
+    }
+
+    /// An application came.
+    pub(super) fn begin(&mut self) {
+        self.frames.begin();
     }
 
     /// Says that this process is there, until the line is dropped.

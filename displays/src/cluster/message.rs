@@ -8,9 +8,11 @@ use super::event::Event;
 use super::transport::ClusterError;
 
 /// Spoken by both ends; another one is refused.
-pub(super) const PROTOCOL: u16 = 4;
+pub(super) const PROTOCOL: u16 = 5;
 
 pub(super) const FRAME: &str = "umbriel/frame";
+/// Where a frame's packet lies in the application's memory.
+pub(super) const HERE: &str = "umbriel/here";
 pub(super) const RELEASE: &str = "umbriel/release";
 pub(super) const READY: &str = "umbriel/ready";
 pub(super) const INPUT: &str = "umbriel/input";

@@ -14,13 +14,21 @@ mod event;
 #[cfg(feature = "cluster")]
 mod follower;
 #[cfg(feature = "cluster")]
+mod frames;
+#[cfg(feature = "cluster")]
+mod gate;
+#[cfg(feature = "cluster")]
 mod host;
 #[cfg(feature = "cluster")]
 mod line;
 #[cfg(feature = "cluster")]
+mod memory;
+#[cfg(feature = "cluster")]
 mod message;
 #[cfg(feature = "cluster")]
 mod ordered;
+#[cfg(feature = "cluster")]
+mod outlets;
 #[cfg(feature = "cluster")]
 mod proxy;
 #[cfg(feature = "cluster")]
@@ -35,7 +43,8 @@ pub use self::{
     certificates::make as make_certificates,
     event::{Event, Input, Motion, Pointing},
     follower::{Follower, FollowerOptions, FollowerReport, Screen},
-    host::{Host, HostOptions, HostReport},
+    gate::HostReport,
+    host::{Host, HostOptions},
     proxy::Proxy,
     transport::{ClusterError, LEASE, Security},
     waits::Waits,

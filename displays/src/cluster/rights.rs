@@ -1,6 +1,8 @@
 //! What the certificate of an end lets it do at the application: a display follows, a guest works on the world.
 
-use super::message::{APPLICATION, BULK, DEEDS, DISPLAY, FRAME, GUEST, GUEST_SNAPSHOT, INPUT, READY, RELEASE, SNAPSHOT, WORD};
+use super::message::{
+    APPLICATION, BULK, DEEDS, DISPLAY, FRAME, GUEST, GUEST_SNAPSHOT, HERE, INPUT, READY, RELEASE, SNAPSHOT, WORD,
+};
 use super::transport::End;
 
 /// Kinds of messages, as the network library calls them, and the subjects on which an end may send them.
@@ -14,13 +16,13 @@ fn rights(end: End) -> Vec<Right> {
         End::Display => vec![
             ("put", all(&[READY, INPUT])),
             ("query", all(&[SNAPSHOT])),
-            ("declare_subscriber", all(&[FRAME, RELEASE])),
+            ("declare_subscriber", all(&[FRAME, HERE, RELEASE])),
             ("liveliness_token", below(DISPLAY)),
         ],
         End::Guest => vec![
             ("put", all(&[DEEDS])),
             ("query", all(&[GUEST_SNAPSHOT])),
-            ("declare_subscriber", all(&[FRAME, WORD])),
+            ("declare_subscriber", all(&[FRAME, HERE, WORD])),
             ("liveliness_token", below(GUEST)),
         ],
     };
@@ -87,10 +89,13 @@ mod tests {
     fn only_guests_touch_the_world() {
         let may = |end, kind, key: &str| rights(end).iter().any(|(known, keys)| *known == kind && keys.iter().any(|k| k == key));
         assert!(may(End::Guest, "put", DEEDS) && may(End::Guest, "query", GUEST_SNAPSHOT));
-        for (kind, key) in [("put", DEEDS), ("query", GUEST_SNAPSHOT), ("put", FRAME), ("put", RELEASE), ("put", WORD)] {
+        for (kind, key) in
+            [("put", DEEDS), ("query", GUEST_SNAPSHOT), ("put", FRAME), ("put", HERE), ("put", RELEASE), ("put", WORD)]
+        {
             assert!(!may(End::Display, kind, key), "{kind} {key}");
         }
-        for (kind, key) in [("put", READY), ("put", INPUT), ("query", SNAPSHOT), ("put", FRAME), ("put", RELEASE), ("put", WORD)]
+        for (kind, key) in
+            [("put", READY), ("put", INPUT), ("query", SNAPSHOT), ("put", FRAME), ("put", HERE), ("put", RELEASE), ("put", WORD)]
         {
             assert!(!may(End::Guest, kind, key), "{kind} {key}");
         }

@@ -10,9 +10,9 @@ use zenoh::Wait;
 use zenoh::pubsub::Publisher as ZenohPublisher;
 use zenoh::qos::CongestionControl;
 
-use crate::cluster::line::{Answer, Line};
+use crate::cluster::line::{Answer, Line, Link};
 use crate::cluster::message::{
-    DEEDS, FRAME, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word, bytes_of, message_of,
+    DEEDS, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word, bytes_of, message_of,
     stamped_packet,
 };
 use crate::cluster::ordered::Outbox;
@@ -112,8 +112,9 @@ impl Guest {
         keeps: bool,
         fresh: fn() -> Graph,
     ) -> Result<Guest, ClusterError> {
-        let subjects = [(FRAME, Arrived::Frame as fn(Vec<u8>) -> Arrived), (WORD, Arrived::Word)];
-        let mut line = Line::open(End::Guest, endpoint, security, LEASE, subjects, Arrived::Host)?;
+        let subject = (WORD, Arrived::Word as fn(Vec<u8>) -> Arrived);
+        let link = Link { end: End::Guest, endpoint, security, lease: LEASE, uses_memory: true };
+        let mut line = Line::open(link, Arrived::Frame, subject, Arrived::Host)?;
         let deeds = line.session.declare_publisher(DEEDS).congestion_control(CongestionControl::Block).wait().map_err(network)?;
         line.announce(GUEST)?;
         Ok(Guest {
@@ -166,6 +167,7 @@ impl Guest {
     pub fn next(&mut self, patience: Duration) -> Result<News, ClusterError> {
         let until = Instant::now() + patience;
         loop {
+            self.line.settle();
             let left = until.saturating_duration_since(Instant::now());
             let mut news = News::None;
             let mut arrived = self.line.arrived.recv_timeout(left.min(Duration::from_millis(5))).ok();
@@ -189,7 +191,7 @@ impl Guest {
     fn handle(&mut self, arrived: Arrived) -> Result<Option<News>, ClusterError> {
         match arrived {
             Arrived::Frame(bytes) => match stamped_packet(bytes) {
-                Ok((epoch, packet)) if epoch == self.epoch => {
+                Ok((epoch, packet)) if epoch == self.epoch && packet.frame() > self.frame() => {
                     self.line.ask_for_bulk(packet.missing(&self.bulk), Arrived::Bulk);
                     self.packets.insert(packet.frame(), packet);
                 }
@@ -241,7 +243,10 @@ impl Guest {
                     }
                 }
             }
-            Arrived::Host(true) => self.asked = None,
+            Arrived::Host(true) => {
+                self.asked = None;
+                self.line.begin();
+            }
             Arrived::Host(false) => {
                 self.forget();
                 return Ok(Some(News::HostGone));

@@ -1,0 +1,230 @@
+//! Where the application's thread and those of the network meet: who is there, what waits to be published, and the lock, which
+//! releases a frame the moment that the last display is ready, whatever the application does meanwhile.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::event::{Event, Input};
+use super::lock::{ApplicationAction, ApplicationEvent, ApplicationLock, DisplayId};
+use super::message::{Ready, Release, Told, message_of};
+use super::ordered::Inbox;
+use super::outlets::{Outlets, Parcel};
+use super::waits::Waits;
+
+/// How often it is looked whether somebody is late.
+const TICK: Duration = Duration::from_millis(2);
+
+/// What happened since the start.
+#[derive(Clone, Debug, Default)]
+pub struct HostReport {
+    /// Frames published.
+    pub frames: u64,
+    /// Bytes of packets.
+    pub bytes: u64,
+    /// From publishing a frame to its release.
+    pub waits: Waits,
+    /// How often a display was left behind.
+    pub dropped: u64,
+    /// Displays that were ready with other values than the application's.
+    pub disagreed: u64,
+    /// Reports of displays that were ready and agreed.
+    pub agreed: u64,
+    /// Joins that were refused.
+    pub refused: u64,
+}
+
+/// A frame that is published once the one before is released.
+pub(super) struct Staged {
+    pub(super) frame: u64,
+    pub(super) hash: u64,
+    pub(super) parcel: Parcel,
+    pub(super) is_last: bool,
+}
+
+/// See above.
+pub(super) struct Gate {
+    lock: ApplicationLock,
+    /// This run: later ones have greater numbers.
+    epoch: u64,
+    started: Instant,
+    outlets: Arc<Outlets>,
+    staged: Option<Staged>,
+    published: Instant,
+    /// The application goes on once a frame is published.
+    ahead: bool,
+    is_last: bool,
+    hashes: HashMap<u64, u64>,
+    pub(super) names: BTreeMap<u64, String>,
+    pub(super) inputs: Vec<Input>,
+    /// By number of the display.
+    inboxes: BTreeMap<u64, Inbox<Event>>,
+    pub(super) report: HostReport,
+    /// The application's thread waits until this is through.
+    is_awaited: bool,
+    wake: Box<dyn Fn() + Send>,
+}
+
+/// Held by threads of the network as well.
+pub(super) type SharedGate = Arc<Mutex<Gate>>;
+
+/// A thread that panicked has left nothing half done that the lock could not stand.
+pub(super) fn enter(gate: &Mutex<Gate>) -> MutexGuard<'_, Gate> {
+    gate.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Gate {
+    /// A gate, and a thread that looks for the late while it is there.
+    pub(super) fn open(
+        timeout: Duration,
+        ahead: bool,
+        epoch: u64,
+        outlets: Arc<Outlets>,
+        wake: impl Fn() + Send + 'static,
+    ) -> SharedGate {
+        let gate = Arc::new(Mutex::new(Gate {
+            lock: ApplicationLock::new(timeout.as_micros() as u64),
+            epoch,
+            started: Instant::now(),
+            outlets,
+            staged: None,
+            published: Instant::now(),
+            ahead,
+            is_last: false,
+            hashes: HashMap::new(),
+            names: BTreeMap::new(),
+            inputs: Vec::new(),
+            inboxes: BTreeMap::new(),
+            report: HostReport::default(),
+            is_awaited: false,
+            wake: Box::new(wake),
+        }));
+        let watched = Arc::downgrade(&gate);
+        std::thread::spawn(move || {
+            while let Some(gate) = watched.upgrade() {
+                enter(&gate).step(ApplicationEvent::Tick);
+                drop(gate);
+                std::thread::sleep(TICK);
+            }
+        });
+        gate
+    }
+
+    pub(super) fn lock(&self) -> &ApplicationLock {
+        &self.lock
+    }
+
+    /// Is the staged frame still to be published, and may the application go on? If not, its thread is woken when something becomes of it.
+    pub(super) fn progress(&mut self) -> (bool, bool) {
+        let is_staged = self.staged.is_some();
+        let is_through = !is_staged && (self.ahead && !self.is_last || !self.lock.waits());
+        self.is_awaited = !is_through;
+        (is_staged, is_through)
+    }
+
+    /// Publishes a frame, now or once the one before is released.
+    pub(super) fn stage(&mut self, staged: Staged) {
+        self.staged = Some(staged);
+        self.publish();
+    }
+
+    /// A display has drawn a frame.
+    pub(super) fn is_ready(&mut self, bytes: &[u8]) {
+        let ready = match message_of::<Ready>(bytes) {
+            Ok(ready) => ready,
+            Err(error) => return tracing::warn!("from a display: {error}"),
+        };
+        if ready.epoch != self.epoch || self.twin(ready.display, &ready.name).is_some() {
+            return;
+        }
+        // Its link broke and came back before it missed a frame.
+        let name = self.names.entry(ready.display).or_insert(ready.name);
+        let is_known = self.hashes.get(&ready.frame);
+        if is_known.is_some_and(|hash| *hash != ready.hash) {
+            self.report.disagreed += 1;
+            return tracing::error!("display `{name}` is ready with frame {}, but its values differ", ready.frame);
+        }
+        self.report.agreed += is_known.is_some() as u64;
+        let display = DisplayId(ready.display);
+        self.step(ApplicationEvent::Ready { display, frame: ready.frame, took_us: ready.took_us });
+    }
+
+    /// Something happened at a display.
+    pub(super) fn is_told(&mut self, bytes: &[u8]) {
+        let told = match message_of::<Told>(bytes) {
+            Ok(told) => told,
+            Err(error) => return tracing::warn!("from a display: {error}"),
+        };
+        // Who is not known by name says it again once it has joined.
+        let Some(name) = self.names.get(&told.display).filter(|_| told.epoch == self.epoch) else { return };
+        let inbox = self.inboxes.entry(told.display).or_default();
+        let inputs = inbox.arrived(told.number, told.event).into_iter();
+        self.inputs.extend(inputs.map(|event| Input { display: name.clone(), event }));
+    }
+
+    /// A display left, or its line broke.
+    pub(super) fn is_gone(&mut self, number: u64) {
+        if let Some(name) = self.names.remove(&number) {
+            tracing::info!("display `{name}` is gone");
+        }
+        self.step(ApplicationEvent::Gone(DisplayId(number)));
+    }
+
+    /// A display that cannot draw this frame is not waited for; it comes back as any other.
+    pub(super) fn excuse(&mut self, number: u64) {
+        self.step(ApplicationEvent::Gone(DisplayId(number)));
+    }
+
+    /// Another display of this name.
+    pub(super) fn twin(&self, number: u64, name: &str) -> Option<u64> {
+        self.names.iter().find(|(other, known)| **other != number && *known == name).map(|(other, _)| *other)
+    }
+
+    fn step(&mut self, event: ApplicationEvent) {
+        let before = (self.staged.is_some(), self.lock.waits());
+        self.act(event);
+        self.publish();
+        if self.is_awaited && before != (self.staged.is_some(), self.lock.waits()) {
+            (self.wake)();
+        }
+    }
+
+    fn publish(&mut self) {
+        while !self.lock.waits()
+            && let Some(Staged { frame, hash, parcel, is_last }) = self.staged.take()
+        {
+            self.hashes.insert(frame, hash);
+            self.hashes.remove(&frame.wrapping_sub(256));
+            self.report.frames = frame;
+            self.report.bytes += parcel.length();
+            self.is_last = is_last;
+            self.published = Instant::now();
+            self.outlets.send(frame, parcel);
+            self.act(ApplicationEvent::Published(frame));
+        }
+    }
+
+    fn act(&mut self, event: ApplicationEvent) {
+        let now_us = self.started.elapsed().as_micros() as u64;
+        for action in self.lock.step(now_us, event) {
+            match action {
+                ApplicationAction::Release(frame, may_show) => {
+                    let may_show = may_show.into_iter().map(|id| id.0).collect();
+                    let is_here = |(display, _): &(&u64, &Inbox<Event>)| self.names.contains_key(display);
+                    let heard = self.inboxes.iter().filter(is_here).map(|(display, inbox)| (*display, inbox.taken())).collect();
+                    self.outlets.release(&Release { epoch: self.epoch, frame, may_show, heard, is_last: self.is_last });
+                    self.report.waits.note(self.published.elapsed());
+                }
+                ApplicationAction::Admitted(id) => {
+                    let name = self.names.get(&id.0).map_or("?", String::as_str);
+                    tracing::info!("display `{name}` is in the lock from frame {} on", self.lock.frame());
+                }
+                ApplicationAction::Dropped(id, frame) => {
+                    let name = self.names.get(&id.0).cloned().unwrap_or_else(|| "?".into());
+                    tracing::warn!("display `{name}` was late for frame {frame}: the others go on without it");
+                    self.report.dropped += 1;
+                }
+            }
+        }
+    }
+}

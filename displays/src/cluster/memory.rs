@@ -1,0 +1,229 @@
+//! Packets for processes of the same machine: they lie in memory of the application, and only where they lie is sent.
+//!
+//! Whoever is told that over its line opens the memory through `/proc` and reads the packet there, so that a display that is cut off learns
+//! nothing. The memory has no name: nothing is left behind by a process that was killed, and the system frees it with the last that holds
+//! it. It takes no part of `/dev/shm`. Who cannot open it (another machine, another user, another system than Linux) gets packets over the network.
+
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom, Write};
+
+use serde::{Deserialize, Serialize};
+
+/// So many packets lie there at once: the one that is read, the one that follows, and two for who is late.
+const PLACES: u64 = 4;
+/// Before the places: the token, and the number of the last packet whose place may be written anew.
+const HEAD: u64 = 16;
+/// Where the first place begins; places are whole pages.
+const PAGE: u64 = 4096;
+/// As the system shows it.
+const NAME: &str = "umbriel";
+
+/// Where a packet lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Whereabouts {
+    process: u32,
+    /// The descriptor in that process.
+    file: i32,
+    /// Of this memory, unlike any other's; zero for none.
+    token: u64,
+    number: u64,
+    at: u64,
+    length: u64,
+}
+
+/// The application's end.
+#[derive(Debug)]
+pub(super) struct Shelf {
+    file: File,
+    token: u64,
+    number: u64,
+    /// Packets up to this one may be gone.
+    gone: u64,
+    place_bytes: u64,
+}
+
+impl Shelf {
+    /// Memory without packets.
+    ///
+    /// # Errors
+    /// The system has none to share.
+    pub(super) fn make() -> Result<Shelf> {
+        Ok(Shelf { file: nameless()?, token: fastrand::u64(1..), number: 0, gone: 0, place_bytes: 0 })
+    }
+
+    /// Writes a packet, over one that was written long ago.
+    ///
+    /// # Errors
+    /// There is no more memory.
+    pub(super) fn put(&mut self, packet: &[u8]) -> Result<Whereabouts> {
+        self.number += 1;
+        self.gone = self.gone.max(self.number.saturating_sub(PLACES));
+        let length = packet.len() as u64;
+        if length > self.place_bytes {
+            // All places move.
+            self.place_bytes = (length + length / 4).next_multiple_of(PAGE);
+            self.gone = self.number - 1;
+        }
+        let head = [self.token.to_le_bytes(), self.gone.to_le_bytes()].concat();
+        // Who reads what is about to be written over finds that out afterwards.
+        write_at(&self.file, 0, &head)?;
+        let at = PAGE + self.number % PLACES * self.place_bytes;
+        write_at(&self.file, at, packet)?;
+        let (process, file) = (std::process::id(), descriptor(&self.file));
+        Ok(Whereabouts { process, file, token: self.token, number: self.number, at, length })
+    }
+}
+
+/// What came of reading.
+#[derive(Debug, PartialEq)]
+pub(super) enum Found {
+    /// The packet.
+    Packet(Vec<u8>),
+    /// It was written over: this process was late.
+    Gone,
+    /// The memory cannot be reached from here.
+    Elsewhere,
+}
+
+/// The other end.
+#[derive(Debug, Default)]
+pub(super) struct Reader {
+    /// With its token.
+    open: Option<(u64, File)>,
+}
+
+impl Reader {
+    pub(super) fn read(&mut self, whereabouts: &Whereabouts) -> Found {
+        if self.open.as_ref().is_none_or(|(token, _)| *token != whereabouts.token) {
+            self.open = open(whereabouts).map(|file| (whereabouts.token, file)).ok();
+        }
+        let Some((_, file)) = &self.open else { return Found::Elsewhere };
+        match packet_at(file, whereabouts) {
+            Ok(Some(bytes)) => Found::Packet(bytes),
+            Ok(None) => Found::Gone,
+            Err(error) => {
+                tracing::debug!("the application's memory cannot be read: {error}");
+                Found::Elsewhere
+            }
+        }
+    }
+}
+
+fn packet_at(file: &File, Whereabouts { number, at, length, .. }: &Whereabouts) -> Result<Option<Vec<u8>>> {
+    if at.saturating_add(*length) > file.metadata()?.len() {
+        return Err(ErrorKind::UnexpectedEof.into());
+    }
+    let bytes = read_at(file, *at, *length)?;
+    let head = read_at(file, 0, HEAD)?;
+    let gone = head.last_chunk().map_or(u64::MAX, |gone| u64::from_le_bytes(*gone));
+    Ok((*number > gone && bytes.len() as u64 == *length).then_some(bytes))
+}
+
+fn write_at(mut file: &File, at: u64, bytes: &[u8]) -> Result<()> {
+    file.seek(SeekFrom::Start(at))?;
+    file.write_all(bytes)
+}
+
+fn read_at(mut file: &File, at: u64, length: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(length as usize);
+    file.seek(SeekFrom::Start(at))?;
+    file.take(length).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// A file that nobody finds by a name.
+#[cfg(target_os = "linux")]
+fn nameless() -> Result<File> {
+    use std::os::unix::fs::PermissionsExt;
+    let file = File::from(rustix::fs::memfd_create(NAME, rustix::fs::MemfdFlags::CLOEXEC)?);
+    // Others of the same user may read it; this process holds it open for writing already.
+    file.set_permissions(std::fs::Permissions::from_mode(0o400))?;
+    Ok(file)
+}
+
+#[cfg(target_os = "linux")]
+fn descriptor(file: &File) -> i32 {
+    use std::os::fd::AsRawFd;
+    file.as_raw_fd()
+}
+
+#[cfg(target_os = "linux")]
+fn open(whereabouts: &Whereabouts) -> Result<File> {
+    let path = std::path::PathBuf::from(format!("/proc/{}/fd/{}", whereabouts.process, whereabouts.file));
+    // On another machine this may be anything, and only to open it may do something.
+    if !std::fs::read_link(&path)?.to_string_lossy().starts_with(&format!("/memfd:{NAME}")) {
+        return Err(ErrorKind::NotFound.into());
+    }
+    let file = File::open(path)?;
+    let head = read_at(&file, 0, HEAD)?;
+    let is_same = head.first_chunk() == Some(&whereabouts.token.to_le_bytes());
+    if is_same { Ok(file) } else { Err(Error::new(ErrorKind::NotFound, "it is other memory")) }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn nameless() -> Result<File> {
+    Err(ErrorKind::Unsupported.into())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn descriptor(_: &File) -> i32 {
+    -1
+}
+
+#[cfg(not(target_os = "linux"))]
+fn open(_: &Whereabouts) -> Result<File> {
+    Err(ErrorKind::Unsupported.into())
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packets_are_read_until_their_place_is_written_anew() {
+        let mut shelf = Shelf::make().unwrap();
+        let mut reader = Reader::default();
+        let packet = |number: u64| vec![number as u8; 3000 + number as usize];
+        let mut put: Vec<Whereabouts> = Vec::new();
+        for number in 0..20u64 {
+            put.push(shelf.put(&packet(number)).unwrap());
+            for (other, whereabouts) in put.iter().enumerate() {
+                let is_there = other as u64 + PLACES > number;
+                let expected = if is_there { Found::Packet(packet(other as u64)) } else { Found::Gone };
+                assert_eq!(reader.read(whereabouts), expected, "{other} after {number}");
+            }
+        }
+        // A longer one moves all places.
+        let longer = shelf.put(&[7; 10_000]).unwrap();
+        assert_eq!(reader.read(&put[19]), Found::Gone);
+        assert_eq!(reader.read(&longer), Found::Packet(vec![7; 10_000]));
+        let after = shelf.put(&[8; 3]).unwrap();
+        assert_eq!((reader.read(&longer), reader.read(&after)), (Found::Packet(vec![7; 10_000]), Found::Packet(vec![8; 3])));
+    }
+
+    #[test]
+    fn what_cannot_be_reached_is_elsewhere() {
+        let mut shelf = Shelf::make().unwrap();
+        let here = shelf.put(b"packet").unwrap();
+        let other_file = File::open("/dev/null").unwrap();
+        let rows = [
+            Whereabouts::default(),
+            Whereabouts { token: here.token ^ 1, ..here },
+            Whereabouts { process: u32::MAX, ..here },
+            Whereabouts { file: descriptor(&other_file), ..here },
+            Whereabouts { length: 1 << 60, ..here },
+            Whereabouts { at: u64::MAX, ..here },
+        ];
+        for row in rows {
+            assert_eq!(Reader::default().read(&row), Found::Elsewhere, "{row:?}");
+        }
+        let mut reader = Reader::default();
+        assert_eq!(reader.read(&here), Found::Packet(b"packet".to_vec()));
+        // Another run of the application.
+        let mut later = Shelf::make().unwrap();
+        let there = later.put(b"later").unwrap();
+        assert_eq!(reader.read(&there), Found::Packet(b"later".to_vec()));
+        drop(shelf);
+        assert_eq!(Reader::default().read(&here), Found::Elsewhere);
+    }
+}

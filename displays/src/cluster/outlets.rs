@@ -1,0 +1,87 @@
+//! What an application tells all: frames and releases.
+
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::{Session, Wait};
+
+use super::memory::{Shelf, Whereabouts};
+use super::message::{FRAME, HERE, RELEASE, Release, bytes_of};
+use super::transport::{ClusterError, network};
+
+/// Where frames and releases go out. All may be dropped: a gap is repaired by a snapshot.
+pub(super) struct Outlets {
+    /// Packets, for who is far.
+    frames: Publisher<'static>,
+    /// Where they lie, for who is near.
+    here: Publisher<'static>,
+    releases: Publisher<'static>,
+}
+
+/// A packet that is ready to go, and where it lies.
+pub(super) struct Parcel {
+    packet: Vec<u8>,
+    whereabouts: Option<Whereabouts>,
+}
+
+impl Parcel {
+    /// Puts a packet into memory where somebody reads it there.
+    pub(super) fn new(packet: Vec<u8>, shelf: &mut Option<Shelf>, outlets: &Outlets) -> Parcel {
+        if shelf.is_none() || !is_heard(&outlets.here) {
+            return Parcel { packet, whereabouts: None };
+        }
+        let put = shelf.as_mut().map(|shelf| shelf.put(&packet));
+        let whereabouts = put.map(|put| {
+            put.unwrap_or_else(|error| {
+                tracing::warn!("no memory for displays of this machine: {error}; they are served over the network");
+                *shelf = None;
+                // Nowhere: they see that they cannot read it.
+                Whereabouts::default()
+            })
+        });
+        Parcel { packet, whereabouts }
+    }
+
+    /// Bytes of the packet.
+    pub(super) fn length(&self) -> u64 {
+        self.packet.len() as u64
+    }
+}
+
+impl Outlets {
+    pub(super) fn open(session: &Session) -> Result<Outlets, ClusterError> {
+        // Express: the last piece of a frame does not wait for company.
+        let declare = |key, priority| {
+            let publisher = session.declare_publisher(key).congestion_control(CongestionControl::Drop);
+            publisher.priority(priority).express(true).wait().map_err(network)
+        };
+        Ok(Outlets {
+            frames: declare(FRAME, Priority::DEFAULT)?,
+            // Of one priority, so that a frame does not overtake the release of the one before.
+            here: declare(HERE, Priority::RealTime)?,
+            releases: declare(RELEASE, Priority::RealTime)?,
+        })
+    }
+
+    pub(super) fn send(&self, frame: u64, parcel: Parcel) {
+        if let Some(whereabouts) = &parcel.whereabouts {
+            warn(self.here.put(bytes_of(whereabouts)).wait(), "frame", frame);
+        }
+        if is_heard(&self.frames) {
+            warn(self.frames.put(parcel.packet).wait(), "frame", frame);
+        }
+    }
+
+    pub(super) fn release(&self, release: &Release) {
+        warn(self.releases.put(bytes_of(release)).wait(), "release of frame", release.frame);
+    }
+}
+
+fn is_heard(publisher: &Publisher<'_>) -> bool {
+    publisher.matching_status().wait().is_ok_and(|status| status.matching())
+}
+
+fn warn(sent: zenoh::Result<()>, what: &str, frame: u64) {
+    if let Err(error) = sent {
+        tracing::warn!("the {what} {frame} could not be sent: {error}");
+    }
+}
