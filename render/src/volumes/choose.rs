@@ -11,7 +11,8 @@
 //! Both counts use the same triangles with the same depths, and "in front of what is seen" is the exact complement of
 //! "not in front", so the two agree bit by bit, not just nearly.
 //!
-//! Caps. A near cap lies on the caster's own surface. It is never in front of what is seen if the surface itself was
+//! Caps. A near cap lies on the caster's own surface, and counts as a little behind it, so that another surface in the same
+//! plane is not half of it in front and half behind. It is never in front of what is seen if the surface itself was
 //! drawn into depth, so z-pass leaves it out there. Of surfaces drawn from their front alone this holds for convex solids:
 //! a ray that meets one from behind came in through its front. It holds for a plane sheet seen from before it, too. A far cap at infinity is in front of nothing; z-pass needs none, and
 //! under parallel light all of it is one point, so z-fail needs none either. A far cap short of infinity can be between N

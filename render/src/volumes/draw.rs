@@ -69,6 +69,8 @@ struct Kind {
     quads: Option<Piece>,
     z_fail: bool,
     turned: bool,
+    /// On the caster's own surface.
+    on_surface: bool,
 }
 
 /// Pipelines of the draw.
@@ -87,6 +89,20 @@ fn in_front(depth: Depth) -> CompareFunction {
         Depth::Reversed => CompareFunction::Greater,
         Depth::Conventional | Depth::Clamped => CompareFunction::Less,
     }
+}
+
+/// How much farther from the eye near caps count as lying, in ways from pixel to pixel: more than rounding takes two triangles
+/// of one plane apart (vertices stand on a grid of 1/256 pixel). What lies in the plane of a cap, as the ground does under a
+/// bottom, is then on the eye's side of it, as the cap's own surface is to the last bit: lit where light and eye are on the same
+/// side, and in shadow where they are not.
+const CAPS_BEHIND_PIXELS: f32 = 1.0 / 32.0;
+
+fn behind(depth: Depth) -> wgpu::DepthBiasState {
+    let away = match depth {
+        Depth::Reversed => -1,
+        Depth::Conventional | Depth::Clamped => 1,
+    };
+    wgpu::DepthBiasState { constant: 4 * away, slope_scale: away as f32 * CAPS_BEHIND_PIXELS, clamp: 0.0 }
 }
 
 /// Counting behind what is seen, faces turned to the eye end a shadow that began behind them, so they count down (the
@@ -123,7 +139,8 @@ impl Drawing {
         let listed = program("volume draw", LISTED, &[Some(view_layout), Some(&layouts.listed)]);
         let quads = program("volume quads", QUADS, &[Some(view_layout), Some(&layouts.quads)]);
         let alone = program("volume group end", LISTED, &[]);
-        let remember = pipeline(device, &target, &alone, "whole_view", CompareFunction::Always, remembering());
+        let always = (CompareFunction::Always, wgpu::DepthBiasState::default());
+        let remember = pipeline(device, &target, &alone, "whole_view", always, remembering());
         Drawing { target, listed, quads, counting: HashMap::new(), remember }
     }
 
@@ -146,7 +163,9 @@ impl Drawing {
                         Some(Piece::SolidCaps) => (&self.quads, "solid_cap"),
                         Some(Piece::FarCaps) => (&self.quads, "far_cap"),
                     };
-                    let made = pipeline(device, &self.target, program, entry, in_front(self.target.depth), stencil);
+                    let depth = self.target.depth;
+                    let bias = if kind.on_surface { behind(depth) } else { Default::default() };
+                    let made = pipeline(device, &self.target, program, entry, (in_front(depth), bias), stencil);
                     self.counting.insert(kind, made);
                 }
             }
@@ -224,7 +243,8 @@ impl Drawing {
 impl Kind {
     fn of(lists: &Lists, piece: Piece, z_fail: bool, grouped: bool) -> Kind {
         let quads = lists.listed.is_none().then_some(piece);
-        Kind { grouped, quads, z_fail, turned: piece == Piece::TurnedCaps }
+        let on_surface = matches!(piece, Piece::NearCaps | Piece::TurnedCaps | Piece::SolidCaps);
+        Kind { grouped, quads, z_fail, turned: piece == Piece::TurnedCaps, on_surface }
     }
 }
 
@@ -245,7 +265,7 @@ fn pipeline(
     target: &Target,
     (module, layout): &(wgpu::ShaderModule, wgpu::PipelineLayout),
     entry_point: &'static str,
-    depth_compare: CompareFunction,
+    (depth_compare, bias): (CompareFunction, wgpu::DepthBiasState),
     stencil: wgpu::StencilState,
 ) -> wgpu::RenderPipeline {
     let targets = [target.colour_format.map(|format| wgpu::ColorTargetState {
@@ -268,7 +288,7 @@ fn pipeline(
             depth_write_enabled: Some(false),
             depth_compare: Some(depth_compare),
             stencil,
-            bias: Default::default(),
+            bias,
         }),
         multisample: wgpu::MultisampleState { count: target.sample_count, ..Default::default() },
         fragment: target.colour_format.map(|_| wgpu::FragmentState {

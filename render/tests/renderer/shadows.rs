@@ -255,3 +255,35 @@ fn maps_are_kept_while_light_and_casters_move_as_one() {
         }
     }
 }
+
+/// Bottoms in the plane of the floor, which the eye sees through walls that have no back: what the light reaches past a missing
+/// side is lit, in one piece.
+#[test]
+fn what_lies_in_the_plane_of_a_face_is_on_its_lit_side() {
+    let without = |face: usize| {
+        let mut mesh = cuboid(Vec3::new(2.2, 1.0, 1.3));
+        mesh.indices = (0..36).filter(|i| i / 6 != face).map(|i| mesh.indices[i]).collect();
+        mesh
+    };
+    let lights = [
+        Light { direction: Vec3::new(-0.5, -1.0, -0.35).normalize(), ..noon() },
+        Light { kind: LightKind::Point, position: Vec3::new(1.9, 1.3, 0.8), ..noon() },
+    ];
+    let eyes = [[2.5, 1.4, 0.3], [0.3, 3.0, -0.2], [-2.2, 1.1, 1.7], [0.4, 0.5, 3.5], [1.3, 0.3, -2.6]].map(Vec3::from);
+    for (name, open) in [("open at a side", 1), ("open at the top", 3)] {
+        let floor = shape(plane(12.0), matt(0.5, 0.5, 0.5), Mat4::from_rotation_y(0.3));
+        let stall = shape(without(open), matt(0.5, 0.5, 0.5), at(0.0, 0.5, 0.0) * Mat4::from_rotation_y(0.2));
+        let drawables = vec![floor, stall];
+        for (light, eye) in lights.iter().flat_map(|light| eyes.map(|eye| (light, eye))) {
+            let light = Light { shadows: ShadowMethod::Volume, ..light.clone() };
+            let scene = Scene { drawables: drawables.clone().into(), lights: vec![light], ..Default::default() };
+            let view = look("plane_of_a_face", eye, Vec3::new(0.1, 0.0, 0.0), [160, 120]);
+            let options = TraceOptions { sub_samples: 2, ..Default::default() };
+            let truth = Tracer::new(&scene).visibility(&scene.lights[0], &view, &options, &|_| ()).unwrap();
+            let shot = shoot(&scene, &Picture { kind: PictureKind::LightVisibility(0), ..Picture::mono(view) });
+            let visibility: Vec<u8> = shot.layers[0].rgba.chunks_exact(4).map(|p| p[0]).collect();
+            let score = score(&truth, &visibility).unwrap();
+            assert!(score.disagreement <= 0.0002, "{name}, from {eye}: {:.3} %", score.disagreement * 100.0);
+        }
+    }
+}
