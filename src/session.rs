@@ -8,7 +8,7 @@ use umbriel_displays::WindowSizes;
 use umbriel_displays::navigation::{Input, NavigationNode};
 use umbriel_displays::rig::{Aim, Pointed, Pointers, Rig, Wanted};
 use umbriel_fields::{Graph, NodeId};
-use umbriel_scene::{Aabb, Picture, Samples, Scene};
+use umbriel_scene::{Aabb, Drawable, Picture, Samples, Scene};
 use umbriel_scenegraph::{Extractor, Viewpoint};
 use umbriel_scripts::{SaveForm, World};
 
@@ -354,16 +354,47 @@ impl Session {
     }
 
     /// The same, and those of the renderer. It names what they are about, as in `mesh 'dust' ...`, and does not know where in the
-    /// script that was made.
+    /// script that was made, nor which shapes have a shader.
     pub(crate) fn problems_with(&mut self, of_renderer: Vec<String>) -> Vec<String> {
         let mut problems = self.problems();
         problems.extend(of_renderer.into_iter().map(|problem| {
+            if let Some(problem) = self.of_shader(&problem) {
+                return problem;
+            }
             let node = problem.split('\'').nth(1).and_then(|name| self.source.graph().find(name));
             placed(&self.source, node, &problem)
         }));
         problems
     }
+
+    /// A problem of a shader, with the shapes that it costs.
+    fn of_shader(&self, problem: &str) -> Option<String> {
+        let mistake = problem.strip_suffix(umbriel_render::WITHOUT_SHADER)?;
+        let has_it = |d: &Drawable| {
+            let shader = d.material.shader.as_ref().filter(|_| d.visible);
+            shader.is_some_and(|s| mistake.strip_prefix(&*s.source.name).is_some_and(|rest| rest.starts_with(':')))
+        };
+        let mut shapes: Vec<(NodeId, &str)> = Vec::new();
+        for (place, d) in self.scene.drawables.iter().enumerate().filter(|(_, d)| has_it(d)) {
+            let node = self.extractor.node_of_drawable(place).filter(|node| shapes.iter().all(|(other, _)| other != node));
+            shapes.extend(node.map(|node| (node, &*d.name)));
+        }
+        let name = |(node, name): &(NodeId, &str)| match self.source.made_at(*node) {
+            Some((file, line, column)) => format!("'{name}' ({file}:{line}:{column})"),
+            None => format!("'{name}'"),
+        };
+        let mut names: Vec<String> = shapes.iter().take(MOST_SHAPES).map(name).collect();
+        if shapes.len() > MOST_SHAPES {
+            names.push(format!("{} more", shapes.len() - MOST_SHAPES));
+        }
+        let last = names.pop()?;
+        let (are, shapes) = if names.is_empty() { ("is", last) } else { ("are", format!("{} and {last}", names.join(", "))) };
+        Some(format!("{mistake}; {shapes} {are} shown without it"))
+    }
 }
+
+/// So many shapes are named where they share a wrong shader.
+const MOST_SHAPES: usize = 3;
 
 /// A problem with the place in the script where its node was made.
 fn placed(source: &Source, node: Option<NodeId>, problem: &impl std::fmt::Display) -> String {

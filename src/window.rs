@@ -86,6 +86,9 @@ impl App for Viewer {
             Vec::new()
         });
         let stats = stage.draw(self.session.scene(), pictures, None)?;
+        for problem in self.session.problems_with(stage.problems()) {
+            tracing::error!("{problem}");
+        }
         tracing::trace!(?stats, time_s, "frame");
         stage.show()
     }

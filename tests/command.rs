@@ -36,7 +36,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
     let truncated = folder("command").join("truncated.glb");
     std::fs::write(&truncated, b"glTF\x02\0\0\0\xff\0\0\0").expect("a file can be written");
     // Name, line of the world, what the message must contain. The rest of the world is drawn.
-    let rows: [(&str, &str, &[&str]); 36] = [
+    let rows: [(&str, &str, &[&str]); 37] = [
         (
             "negative_soft_range",
             r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "volume", soft: "range", soft_range: -1.0 }));"#,
@@ -155,7 +155,16 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
         (
             "wrong_shader",
             r#"world.add(shape(make("Box"), appearance(#{ shader: make("FragmentShader", #{ name: "toon", source: "\nfn shade() {}" }) })));"#,
-            &["FragmentShader 'toon', source:2:1: it must be `fn shade(s: Surface, light: LightSample) -> vec3<f32>`"],
+            &[
+                "FragmentShader 'toon', source:2:1: it must be `fn shade(s: Surface, light: LightSample) -> vec3<f32>`",
+                "vec3<f32>`; 'unnamed Shape' (",
+                "wrong_shader.rhai:4:11) is shown without it",
+            ],
+        ),
+        (
+            "wrong_shader_of_many",
+            r#"let look = appearance(#{ shader: make("FragmentShader", #{ name: "toon", source: "fn shade() {}" }) }); for i in 0..5 { let s = shape(make("Box"), look); s.name = `ball${i}`; world.add(s); }"#,
+            &["'ball0' (", "wrong_shader_of_many.rhai:4:129), 'ball1' (", "'ball2' (", "and 2 more are shown without it"],
         ),
         (
             "endless_number",

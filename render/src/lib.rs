@@ -38,6 +38,7 @@ mod targets;
 mod uniforms;
 pub mod volumes;
 
+pub use author::WITHOUT_SHADER;
 pub use error::Error;
 pub use gpu::Gpu;
 pub use read_back::{GreyPixels, RgbaPixels};

@@ -212,6 +212,7 @@ impl Screen for InWindow<'_, '_> {
     fn draw(&mut self, graph: &Graph, _frame: u64, is_new: bool) -> Result<(), ScreenError> {
         let seen = self.sight.look(graph, is_new, &self.stage.sizes())?;
         self.stage.draw(&self.sight.scene, seen.pictures, Some(&seen.all))?;
+        self.stage.problems().iter().for_each(|problem| tracing::warn!("{problem}"));
         Ok(self.stage.wait()?)
     }
 

@@ -89,10 +89,14 @@ impl Stage<'_> {
         let mut stats = FrameStats::default();
         if let Some((_, renderer)) = drawing.as_mut().filter(|_| !pictures.is_empty()) {
             stats = renderer.render_part(scene, &pictures, all.unwrap_or(&pictures))?;
-            renderer.problems().iter().for_each(|problem| tracing::warn!("{problem}"));
         }
         self.panes.pictures = pictures;
         Ok(stats)
+    }
+
+    /// What the renderer found wrong since this was last called.
+    pub fn problems(&mut self) -> Vec<String> {
+        self.panes.drawing.as_mut().map_or_else(Vec::new, |(_, renderer)| renderer.problems())
     }
 
     /// Waits until everything is drawn.

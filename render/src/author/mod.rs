@@ -57,6 +57,9 @@ pub(crate) struct Authors {
     last: u32,
 }
 
+/// How a message about an author's shader ends. Whoever knows the shapes may name them instead.
+pub const WITHOUT_SHADER: &str = "; its shapes are shown without it";
+
 impl Authors {
     /// The number of a material's shader; [`STANDARD`] where it has none. What is wrong with it is told to `report` as long as it is new.
     pub(crate) fn number_of(
@@ -110,7 +113,7 @@ fn within_limits(key: &Key) -> Result<(), String> {
     if count <= MAX_PARAMS {
         return Ok(());
     }
-    Err(format!("{name}: a shader takes {MAX_PARAMS} parameters, it is given {count}; its shapes are shown without it"))
+    Err(format!("{name}: a shader takes {MAX_PARAMS} parameters, it is given {count}{WITHOUT_SHADER}"))
 }
 
 /// Our own functions in place of an author's.
@@ -160,5 +163,5 @@ fn compile(device: &wgpu::Device, key: &Key) -> Result<Author, String> {
             .join()
             .unwrap_or_else(|_| Err(broken("the compiler gave up on it")))
     });
-    result.map_err(|message| format!("{message}; its shapes are shown without it"))
+    result.map_err(|message| format!("{message}{WITHOUT_SHADER}"))
 }
