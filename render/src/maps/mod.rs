@@ -224,7 +224,8 @@ impl Maps {
             };
             let (projection, place) = (fit.projection, tile.1);
             let waits = light.map.update == MapUpdate::Never && light.map.request == Some(0);
-            let is_empty = waits && held.is_none_or(|h| h.is_empty);
+            // One that takes the place of the light's own map was not asked for either.
+            let is_empty = waits && held.is_none_or(|h| h.is_empty || h.light.map.request.is_none());
             let (index, draws) = (wanted.index, Arc::default());
             let holes_only = maps_holes_only(light);
             self.faces.push(Face {

@@ -115,22 +115,25 @@ fn a_light_that_does_not_shine_lights_nothing() {
 #[test]
 fn a_map_is_drawn_when_its_rule_says() {
     let mut shooter = Shooter::new();
-    let map = |update, request| MapSettings { size: 256, update, request: Some(request), ..Default::default() };
+    let map = |update, request| MapSettings { size: 256, update, request, ..Default::default() };
     let lamp = Light { shines: true, intensity: 200.0, ..dark_lamp(MapSettings::default()) };
     let still = ball_over(matt(0.5, 0.5, 0.5), vec![lamp]);
     use MapUpdate::{Always, Auto, Never};
     // Rule, how far the ball has moved, whether the map is drawn, whether the middle is dark.
     for (name, update, request, x, is_drawn, is_dark) in [
-        ("never asked for: emptied once", Never, 0, 0.0, true, false),
-        ("still not", Never, 0, 0.0, false, false),
-        ("asked for", Never, 1, 0.0, true, true),
-        ("the ball has gone, its shadow stays", Never, 1, 3.0, false, true),
-        ("asked for again", Never, 2, 3.0, true, false),
-        ("always", Always, 2, 0.0, true, true),
-        ("always, though nothing changed", Always, 2, 0.0, true, true),
-        ("automatic, nothing changed", Auto, 2, 0.0, false, true),
-        ("automatic", Auto, 2, 3.0, true, false),
-        ("kept as it is", Never, 2, 0.0, false, false),
+        ("never asked for: emptied once", Never, Some(0), 0.0, true, false),
+        ("still not", Never, Some(0), 0.0, false, false),
+        ("asked for", Never, Some(1), 0.0, true, true),
+        ("the ball has gone, its shadow stays", Never, Some(1), 3.0, false, true),
+        ("asked for again", Never, Some(2), 3.0, true, false),
+        ("always", Always, Some(2), 0.0, true, true),
+        ("always, though nothing changed", Always, Some(2), 0.0, true, true),
+        ("automatic, nothing changed", Auto, Some(2), 0.0, false, true),
+        ("automatic", Auto, Some(2), 3.0, true, false),
+        ("kept as it is", Never, Some(2), 0.0, false, false),
+        ("the light's own", Auto, None, 0.0, true, true),
+        ("one in its place, never asked for", Never, Some(0), 0.0, true, false),
+        ("asked for at last", Never, Some(1), 0.0, true, true),
     ] {
         let mut scene = still.clone();
         scene.lights[0].map = map(update, request);
