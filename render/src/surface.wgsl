@@ -72,7 +72,10 @@ fn place(f: Fragment, covered: u32) -> Surface {
     let down = dpdy(f.p_in_world);
     s.position = f.p_in_world;
     if MAPS {
-        s.position += mat2x3<f32>(across, down) * middle_of(covered);
+        // The middle of a pixel may lie beyond the shape's edge, and so behind the next wall of a corner. (Interpolation at centroids would do,
+        // were it exact on all devices.)
+        footprint = Footprint(across, down, samples_of(covered));
+        s.position += mat2x3<f32>(across, down) * middle_of_footprint();
     }
     s.uv0 = f.uv0;
     s.uv1 = f.uv1;
@@ -104,20 +107,14 @@ fn place(f: Fragment, covered: u32) -> Surface {
     return surface(s);
 }
 
-// Middle of the covered samples from that of the pixel, pixels right and down. The middle of a pixel may lie beyond the shape's edge, and
-// so behind the next wall of a corner. (Interpolation at centroids would do, were it exact on all devices.)
-fn middle_of(covered: u32) -> vec2<f32> {
-    if covered == ALL_SAMPLES || view.first_sample.x == 0.0 {
-        return vec2<f32>(0.0);
+// Which samples of the pixel are on the shape; all of them where there is one.
+fn samples_of(covered: u32) -> vec4<f32> {
+    if view.first_sample.x == 0.0 {
+        return vec4<f32>(1.0);
     }
-    let is_covered = vec4<f32>((vec4<u32>(covered) >> vec4<u32>(0u, 1u, 2u, 3u)) & vec4<u32>(1u));
-    let sum = vec2<f32>(dot(is_covered, SAMPLES_X), dot(is_covered, SAMPLES_Y));
-    return sum / max(dot(is_covered, vec4<f32>(1.0)), 1.0);
+    return vec4<f32>((vec4<u32>(covered) >> vec4<u32>(0u, 1u, 2u, 3u)) & vec4<u32>(1u));
 }
 
-// The standard sample locations of Vulkan, Metal and Direct3D, from the middle of the pixel.
-const SAMPLES_X = vec4<f32>(-0.125, 0.375, -0.375, 0.125);
-const SAMPLES_Y = vec4<f32>(-0.375, -0.125, 0.125, 0.375);
 const ALL_SAMPLES = 15u;
 
 // Normal from the normal texture; where the mesh has no tangents they follow from the texture coordinates

@@ -89,6 +89,13 @@ pub(crate) fn cascades(light: &Light, size: u32, eyes: &[Eye], receivers: Aabb, 
 /// A first slice never has to reach farther than this many metres; wide worlds get more maps instead.
 const FIRST_SLICE_M: f32 = 2.0;
 
+/// Through a lens, a range this many times as long as it is wide where it begins has texels as fine as those of a wide view.
+const LONGEST_RANGE: f32 = 1.6;
+/// Views narrower than this, as share of the distance, are seen through a lens.
+const NARROW: f32 = 0.8;
+/// No more maps than this, whatever the lens.
+const MOST_BY_LENS: f32 = 8.0;
+
 /// Ranges of distance, one per map: between equal steps and equal ratios (Zhang et al. 2006, Parallel-split shadow
 /// maps, section 3); where sight is far, equal steps would leave nothing for what is near, so they weigh less.
 fn slices(eyes: &[Eye]) -> Vec<(f32, f32)> {
@@ -98,7 +105,11 @@ fn slices(eyes: &[Eye]) -> Vec<(f32, f32)> {
         return Vec::new();
     }
     let most = if far > 400.0 * near { 5.0 } else { 4.0 };
-    let count = ((far / near).log2() * 1.2).ceil().clamp(1.0, most);
+    let mut count = ((far / near).log2() * 1.2).ceil().clamp(1.0, most);
+    let width = width_of(eyes);
+    if width < NARROW {
+        count = count.max(((far / near).ln() / (LONGEST_RANGE * width).ln_1p()).ceil().min(MOST_BY_LENS));
+    }
     let steps = 0.3 * (100.0 * FIRST_SLICE_M / far).min(1.0);
     let split = |i: f32| {
         let share = i / count;
@@ -113,6 +124,17 @@ fn slices(eyes: &[Eye]) -> Vec<(f32, f32)> {
         from = to;
     }
     ranges
+}
+
+/// How wide all that is seen is at distance 1.
+fn width_of(eyes: &[Eye]) -> f32 {
+    let ray = |eye: &Eye, x: f32, y: f32| eye.world_from_view.transform_vector3(Vec3::new(x, y, -1.0));
+    let corners = eyes.iter().flat_map(|eye| {
+        let [l, r, b, t] = eye.window;
+        [ray(eye, l, b), ray(eye, r, b), ray(eye, r, t), ray(eye, l, t)]
+    });
+    let all = Aabb::from_points(corners);
+    (all.max - all.min).max_element()
 }
 
 /// Corners of the part of a view between two distances that lies in a box, in the world.
@@ -214,6 +236,28 @@ mod tests {
         assert!((near - expected_near).abs() < 1e-2 && (far - expected_far).abs() < 1e-2, "{near} {far}");
         let behind = Aabb { min: Vec3::new(-1.0, 0.0, 5.0), max: Vec3::new(1.0, 1.0, 6.0) };
         assert_eq!(eye.depths_of(&behind), None);
+    }
+
+    #[test]
+    fn a_lens_gets_ranges_as_short_as_it_is_narrow() {
+        let eye = |half: f32, turn: f32| Eye {
+            world_from_view: Mat4::from_rotation_y(turn),
+            window: [-half, half, -half, half],
+            near: 8.0,
+            far: 500.0,
+        };
+        for (name, eyes, count) in [
+            ("wide", vec![eye(0.6, 0.0)], 4),
+            ("a lens of 20 degrees", vec![eye(0.176, 0.0)], 8),
+            ("two of them, in other directions", vec![eye(0.176, 0.0), eye(0.176, 1.0)], 4),
+        ] {
+            let found = slices(&eyes);
+            assert_eq!(found.len(), count, "{name}: {found:?}");
+            assert!(found.windows(2).all(|pair| pair[0].1 == pair[1].0) && found[count - 1].1 >= 500.0, "{name}: {found:?}");
+        }
+        // What is near is as long as it is wide, about.
+        let (from, to) = slices(&[eye(0.176, 0.0)])[1];
+        assert!(to - from < 2.5 * LONGEST_RANGE * 0.352 * from, "{from} {to}");
     }
 
     #[test]

@@ -137,7 +137,57 @@ fn face_visibility(light: Light, face: MapFace, p_in_world: vec3<f32>, face_norm
         let centre = clamp(floor(r.t), vec2<f32>(0.0), vec2<f32>(side - 1.0)) + 0.5;
         return select(1.0, 0.0, hides(face, r, centre));
     }
-    return filtered(face, light.filter_width, r);
+    let width = light.filter_width;
+    let around = mat2x3<f32>(footprint.across - towards * dot(footprint.across, towards), footprint.down - towards * dot(footprint.down, towards));
+    if width > 1.0 && max(length(around[0]), length(around[1])) > width * texel {
+        return filtered_by_samples(face, r, p);
+    }
+    return filtered(face, width, r);
+}
+
+// What a pixel shows of a triangle: how far its place moves to the next pixel to the right and down, metres, and the samples that are
+// on it. Set before maps are asked.
+struct Footprint {
+    across: vec3<f32>,
+    down: vec3<f32>,
+    covered: vec4<f32>,
+};
+
+var<private> footprint: Footprint;
+
+// The standard sample locations of Vulkan, Metal and Direct3D, from the middle of the pixel, pixels right and down.
+const SAMPLES_X = vec4<f32>(-0.125, 0.375, -0.375, 0.125);
+const SAMPLES_Y = vec4<f32>(-0.375, -0.125, 0.125, 0.375);
+
+// Middle of the covered samples.
+fn middle_of_footprint() -> vec2<f32> {
+    let covered = footprint.covered;
+    return vec2<f32>(dot(covered, SAMPLES_X), dot(covered, SAMPLES_Y)) / max(dot(covered, vec4<f32>(1.0)), 1.0);
+}
+
+// A pixel that shows more of the map than a filter covers, as of a ground far away: one bilinear comparison for each of its samples, so
+// that thin shadows are as smooth there as shapes are. `p` is the middle of the footprint.
+fn filtered_by_samples(face: MapFace, middle: Receiver, p: vec3<f32>) -> f32 {
+    let side = f32(face.tile.z);
+    let centre = middle_of_footprint();
+    var lit = 0.0;
+    var count = 0.0;
+    for (var i = 0u; i < 4u; i++) {
+        let step = vec2<f32>(SAMPLES_X[i], SAMPLES_Y[i]) - centre;
+        let clip = face.map_from_world * vec4<f32>(p + footprint.across * step.x + footprint.down * step.y, 1.0);
+        var r = middle;
+        r.t = (clip.xy / clip.w * vec2<f32>(0.5, -0.5) + 0.5) * side;
+        r.depth = clip.z / clip.w;
+        // Beyond the map's edge other maps know.
+        if footprint.covered[i] > 0.0 && clip.w > 0.0 && all(abs(r.t - 0.5 * side) < vec2<f32>(0.5 * side - 2.0)) {
+            lit += filtered(face, 1.0, r);
+            count += 1.0;
+        }
+    }
+    if count == 0.0 {
+        return filtered(face, 1.0, middle);
+    }
+    return lit / count;
 }
 
 // The receiver as the filters see it.
