@@ -410,7 +410,9 @@ impl Follower {
         let (Some(packet), Some(replica)) = (self.packets.remove(&frame), &mut self.replica) else {
             return Ok(DisplayEvent::Diverged(frame));
         };
-        match replica.apply(&packet, &self.bulk) {
+        let applied = replica.apply(&packet, &self.bulk);
+        self.line.reuse(packet.into_bytes());
+        match applied {
             Ok(()) if replica.agrees() => return Ok(DisplayEvent::Applied(frame)),
             Ok(()) => {
                 tracing::warn!("frame {frame}: the world here is not that of the application; fetching it");

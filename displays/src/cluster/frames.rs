@@ -85,6 +85,13 @@ impl Frames {
         self.way.load(Ordering::Relaxed) == NEAR
     }
 
+    /// Takes the memory of a packet that is not needed any more.
+    pub(super) fn reuse(&self, bytes: Vec<u8>) {
+        if self.is_near() {
+            self.reader.lock().unwrap_or_else(PoisonError::into_inner).reuse(bytes);
+        }
+    }
+
     /// An application came: whether its memory can be read is to be seen.
     pub(super) fn begin(&mut self) {
         if self.uses_memory {

@@ -186,7 +186,8 @@ impl Host {
         // All that can be done before the displays are.
         let packet = stamped(self.epoch, self.publisher.frame(graph));
         let (frame, hash) = (self.publisher.last_frame(), self.publisher.hash());
-        let parcel = Parcel::new(packet, &mut self.shelf, &self.outlets);
+        let (parcel, spare) = Parcel::new(packet, &mut self.shelf, &self.outlets);
+        spare.into_iter().for_each(|spare| self.publisher.reuse(spare));
         enter(&self.gate).stage(Staged { frame, hash, parcel, is_last });
         loop {
             let (is_staged, is_through) = enter(&self.gate).progress();

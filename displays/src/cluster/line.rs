@@ -84,6 +84,11 @@ impl<A: Send + 'static> Line<A> {
         self.frames.is_near()
     }
 
+    /// Takes the memory of a frame's packet that is not needed any more.
+    pub(super) fn reuse(&self, bytes: Vec<u8>) {
+        self.frames.reuse(bytes);
+    }
+
     /// An application came.
     pub(super) fn begin(&mut self) {
         self.frames.begin();

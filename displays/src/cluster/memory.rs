@@ -90,15 +90,22 @@ pub(super) enum Found {
 pub(super) struct Reader {
     /// With its token.
     open: Option<(u64, File)>,
+    /// Where a packet was that is not needed any more: new memory costs as much as reading.
+    spare: Vec<u8>,
 }
 
 impl Reader {
+    /// Takes the memory of a packet.
+    pub(super) fn reuse(&mut self, bytes: Vec<u8>) {
+        self.spare = bytes;
+    }
+
     pub(super) fn read(&mut self, whereabouts: &Whereabouts) -> Found {
         if self.open.as_ref().is_none_or(|(token, _)| *token != whereabouts.token) {
             self.open = open(whereabouts).map(|file| (whereabouts.token, file)).ok();
         }
         let Some((_, file)) = &self.open else { return Found::Elsewhere };
-        match packet_at(file, whereabouts) {
+        match packet_at(file, whereabouts, std::mem::take(&mut self.spare)) {
             Ok(Some(bytes)) => Found::Packet(bytes),
             Ok(None) => Found::Gone,
             Err(error) => {
@@ -109,12 +116,13 @@ impl Reader {
     }
 }
 
-fn packet_at(file: &File, Whereabouts { number, at, length, .. }: &Whereabouts) -> Result<Option<Vec<u8>>> {
+fn packet_at(file: &File, whereabouts: &Whereabouts, spare: Vec<u8>) -> Result<Option<Vec<u8>>> {
+    let Whereabouts { number, at, length, .. } = whereabouts;
     if at.saturating_add(*length) > file.metadata()?.len() {
         return Err(ErrorKind::UnexpectedEof.into());
     }
-    let bytes = read_at(file, *at, *length)?;
-    let head = read_at(file, 0, HEAD)?;
+    let bytes = read_at(file, *at, *length, spare)?;
+    let head = read_at(file, 0, HEAD, Vec::new())?;
     let gone = head.last_chunk().map_or(u64::MAX, |gone| u64::from_le_bytes(*gone));
     Ok((*number > gone && bytes.len() as u64 == *length).then_some(bytes))
 }
@@ -124,8 +132,9 @@ fn write_at(mut file: &File, at: u64, bytes: &[u8]) -> Result<()> {
     file.write_all(bytes)
 }
 
-fn read_at(mut file: &File, at: u64, length: u64) -> Result<Vec<u8>> {
-    let mut bytes = Vec::with_capacity(length as usize);
+fn read_at(mut file: &File, at: u64, length: u64, mut bytes: Vec<u8>) -> Result<Vec<u8>> {
+    bytes.clear();
+    bytes.reserve(length as usize);
     file.seek(SeekFrom::Start(at))?;
     file.take(length).read_to_end(&mut bytes)?;
     Ok(bytes)
@@ -155,7 +164,7 @@ fn open(whereabouts: &Whereabouts) -> Result<File> {
         return Err(ErrorKind::NotFound.into());
     }
     let file = File::open(path)?;
-    let head = read_at(&file, 0, HEAD)?;
+    let head = read_at(&file, 0, HEAD, Vec::new())?;
     let is_same = head.first_chunk() == Some(&whereabouts.token.to_le_bytes());
     if is_same { Ok(file) } else { Err(Error::new(ErrorKind::NotFound, "it is other memory")) }
 }

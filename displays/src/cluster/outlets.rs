@@ -17,19 +17,18 @@ pub(super) struct Outlets {
     releases: Publisher<'static>,
 }
 
-/// A packet that is ready to go, and where it lies.
+/// A packet that is ready to go: itself, where somebody wants it over the network, and where it lies.
 pub(super) struct Parcel {
     packet: Vec<u8>,
     whereabouts: Option<Whereabouts>,
+    length: u64,
 }
 
 impl Parcel {
-    /// Puts a packet into memory where somebody reads it there.
-    pub(super) fn new(packet: Vec<u8>, shelf: &mut Option<Shelf>, outlets: &Outlets) -> Parcel {
-        if shelf.is_none() || !is_heard(&outlets.here) {
-            return Parcel { packet, whereabouts: None };
-        }
-        let put = shelf.as_mut().map(|shelf| shelf.put(&packet));
+    /// Puts a packet into memory where somebody reads it there. Gives the packet back if nobody wants it otherwise.
+    pub(super) fn new(packet: Vec<u8>, shelf: &mut Option<Shelf>, outlets: &Outlets) -> (Parcel, Option<Vec<u8>>) {
+        let length = packet.len() as u64;
+        let put = shelf.as_mut().filter(|_| is_heard(&outlets.here)).map(|shelf| shelf.put(&packet));
         let whereabouts = put.map(|put| {
             put.unwrap_or_else(|error| {
                 tracing::warn!("no memory for displays of this machine: {error}; they are served over the network");
@@ -38,12 +37,15 @@ impl Parcel {
                 Whereabouts::default()
             })
         });
-        Parcel { packet, whereabouts }
+        match is_heard(&outlets.frames) {
+            true => (Parcel { packet, whereabouts, length }, None),
+            false => (Parcel { packet: Vec::new(), whereabouts, length }, Some(packet)),
+        }
     }
 
     /// Bytes of the packet.
     pub(super) fn length(&self) -> u64 {
-        self.packet.len() as u64
+        self.length
     }
 }
 
@@ -66,7 +68,7 @@ impl Outlets {
         if let Some(whereabouts) = &parcel.whereabouts {
             warn(self.here.put(bytes_of(whereabouts)).wait(), "frame", frame);
         }
-        if is_heard(&self.frames) {
+        if !parcel.packet.is_empty() {
             warn(self.frames.put(parcel.packet).wait(), "frame", frame);
         }
     }

@@ -87,9 +87,10 @@ pub(super) struct Draft {
 }
 
 impl Draft {
-    /// An empty one, for so many bytes as a rule.
-    pub(super) fn new(usual_length: usize) -> Draft {
-        let mut bytes = Vec::with_capacity(usual_length + usual_length / 8 + 256);
+    /// An empty one, in memory that may have been another's, for so many bytes as a rule.
+    pub(super) fn new(mut bytes: Vec<u8>, usual_length: usize) -> Draft {
+        bytes.clear();
+        bytes.reserve(usual_length + usual_length / 8 + 256);
         bytes.resize(VALUES, 0);
         Draft { head: Head::default(), groups: BTreeMap::new(), bytes }
     }
@@ -193,6 +194,11 @@ impl<'a> Packet<'a> {
             let runs = Runs::read(&self.bytes[runs.clone()])?;
             Ok(GroupRead { field_type: *field_type, field: *field, values: &self.bytes[values.clone()], runs })
         })
+    }
+
+    /// The memory of its bytes, to be used again.
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.bytes.into_owned()
     }
 
     /// The number of the frame.

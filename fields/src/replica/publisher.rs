@@ -72,6 +72,8 @@ pub struct Publisher {
     written: Vec<Vec<(u32, u32)>>,
     /// Bytes of the last packet.
     usual_length: usize,
+    /// Memory of one that is not needed any more.
+    spare: Vec<u8>,
     hashes: ImageHashes,
     offered: Offered,
     /// What fields hold of what is offered.
@@ -99,10 +101,15 @@ impl Publisher {
         self.offered.get(hash)
     }
 
+    /// Takes a packet back that was sent, so that the next one lies where it lay.
+    pub fn reuse(&mut self, packet: Vec<u8>) {
+        self.spare = packet;
+    }
+
     /// The next frame: what was written since the last one. To be called between evaluations.
     pub fn frame(&mut self, graph: &Graph) -> Vec<u8> {
         self.frame += 1;
-        let mut draft = Draft::new(self.usual_length);
+        let mut draft = Draft::new(std::mem::take(&mut self.spare), self.usual_length);
         self.new.clear();
         let is_reshaped = graph.changes.shape() > self.mark || self.frame == 1;
         let fields_changed = is_reshaped && self.reshape(graph, &mut draft);
@@ -229,7 +236,7 @@ impl Publisher {
         if graph.revision() != self.mark {
             return None;
         }
-        let mut draft = Draft::new(self.usual_length);
+        let mut draft = Draft::new(Vec::new(), self.usual_length);
         draft.head.is_snapshot = true;
         for (number, node_type) in self.types.clone().iter().enumerate() {
             draft.head.types.push((number as u32, self.type_record(node_type)));
