@@ -152,7 +152,10 @@ impl Tracer {
         };
         let eps = self.soup.diagonal() * options.eps_scale;
         let receives = self.soup.shapes[triangle.shape as usize].receives;
-        Some(Place { class, to_light, far, start: point + facing * eps, eps, receives })
+        // From the start on, the ray must end at the light, or one that stands in a surface is hidden by what it stands in.
+        let start = point + facing * eps;
+        let (to_light, far) = beam.to_light(start, facing);
+        Some(Place { class, to_light, far, start, eps, receives })
     }
 
     /// The first triangle along the ray that the eye sees.
@@ -176,12 +179,12 @@ impl Tracer {
 struct Place {
     /// Lit, away or outside.
     class: u8,
-    /// Unit vector.
-    to_light: DVec3,
-    /// Distance of the light, metres.
-    far: f64,
     /// Where shadow rays start.
     start: DVec3,
+    /// Unit vector from there.
+    to_light: DVec3,
+    /// Distance of the light from there, metres.
+    far: f64,
     /// Distance of the start from the surface, metres.
     eps: f64,
     receives: bool,

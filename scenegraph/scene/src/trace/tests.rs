@@ -185,6 +185,17 @@ fn sheets_sides_and_alpha_modes() {
     assert_eq!(class(&deaf, &sun(Vec3::NEG_Y), under, Vec3::ZERO, &plain), LIT, "receives no shadows");
 }
 
+/// A lamp in the ground shines on what hangs over it, and leans towards it, from afar.
+#[test]
+fn what_a_light_stands_in_does_not_hide_it() {
+    let leaning = Mat4::from_translation(vec3(8.0, 0.2, 0.0)) * Mat4::from_rotation_z(2.0);
+    let world = scene(vec![ground(10.0), with(drawable(square(), leaning), |_, m| m.double_sided = true)]);
+    let at = |up: f32| leaning.transform_point3(vec3(up, 0.0, 0.1));
+    let eye = vec3(5.0, 0.3, 0.1);
+    check("in the ground", &world, &lamp(Vec3::ZERO), &[(eye, at(0.0), LIT), (eye, at(0.15), LIT), (eye, at(-0.15), LIT)]);
+    check("under it", &world, &lamp(Vec3::NEG_Y * 0.01), &[(eye, at(0.0), SHADOW)]);
+}
+
 #[test]
 fn alpha_masks_have_holes_for_the_eye_and_for_light() {
     // The left half of the sheet is there, the right half is not.
