@@ -106,6 +106,15 @@ fn errors() {
         ("define(\"A\", #{ field: #{} });", &["test:1:1", "no part `field`", "fields"]),
         ("define(\"A\", #{ fields: #{ a: 1 }, changed: #{ b: |me, v| 1 } });", &["test:1:1", "no field `b`"]),
         ("define(\"Box\", #{});", &["test:1:1", "Box"]),
+        ("let g = group([]);\nevaluate_when(g, \"always\");", &["test:2:1", "an unnamed Group has no evaluate"]),
+        (
+            "let s = make(\"Sum\");\nevaluate_when(s, \"allways\");",
+            &["test:2:1", "on_change, always, pull", "did you mean `always`"],
+        ),
+        (
+            "let a = make(\"Sum\"); let b = make(\"Sum\"); route(a, \"value\", b, \"a\");\ndepend_for_this_frame(a, b);",
+            &["test:2:1", "an unnamed Sum"],
+        ),
         ("list(\"vec5\");", &["test:1:1", "vec5", "vec"]),
         ("let a = group([]);\nadd_field(a, \"path\", []);", &["test:2:1", "path", "list(\"vec3\")"]),
         ("eval(\"1\");", &["test:1:", "eval"]),

@@ -44,6 +44,16 @@ fn types_on_types() {
             &[1.0, 2.0, 2.0],
             &[("s.translation.x", "6.0"), ("s.runs", "3"), ("s.scale.y", "3.0"), ("s.type", "Spinner"), ("find_all(\"Transform\") == [s]", "true"), ("find_all(\"Spinner\").len()", "1")],
         ),
+        // in every frame, only when another depends on it, and in the order that a frame asks for
+        (
+            "define(\"Count\", #{ fields: #{ x: 0.0, runs: 0, order: 0, log: () }, evaluate: |me, time| { me.runs += 1; me.log.last += 1; me.order = me.log.last; } });
+             let log = group([]); add_field(log, \"last\", 0);
+             let a = make(\"Count\", #{ log: log }); let b = make(\"Count\", #{ log: log }); let c = make(\"Count\", #{ log: log });
+             evaluate_when(b, \"always\"); evaluate_when(c, \"pull\");
+             let n = 0; on_frame(|| { n += 1; if n == 3 { a.x = 1; c.x = 1; depend_for_this_frame(a, c); } });",
+            &[1.0, 2.0, 3.0, 4.0],
+            &[("[a.runs, b.runs, c.runs]", "[2, 4, 1]"), ("c.order < a.order", "true")],
+        ),
         // evaluated when written, once in a frame whatever was written, and not by what it writes itself
         (
             "define(\"Mover\", #{ extends: \"Transform\", fields: #{ goal: 0.0, runs: 0 }, evaluate: |me, time| { me.translation.x = me.goal; me.runs += 1; } });

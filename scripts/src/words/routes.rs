@@ -1,9 +1,9 @@
 //! Routes from field to field.
 
-use umbriel_fields::Strength;
+use umbriel_fields::{Evaluator, Mode, Strength};
 
 use super::Words;
-use crate::error::{Outcome, fail};
+use crate::error::{Outcome, fail, hint};
 use crate::stage::{Node, Stage};
 
 pub(super) fn teach(words: &mut Words<'_>) {
@@ -25,6 +25,40 @@ pub(super) fn teach(words: &mut Words<'_>) {
         "Ends a route.",
         move |from: Node, out: &str, to: Node, into: &str| unroute(&stage, (from, out), (to, into)),
     );
+    let stage = words.stage.clone();
+    words.word(
+        "evaluate_when(node: Node, mode: string)",
+        "When a node is evaluated: `\"on_change\"`, in frames in which a field was written; `\"always\"`, in every frame; `\"pull\"`, only in frames \
+         in which another node depends on it by `depend_for_this_frame`.",
+        move |node: Node, mode: &str| evaluate_when(&stage, node, mode),
+    );
+    let stage = words.stage.clone();
+    words.word(
+        "depend_for_this_frame(node: Node, on: Node)",
+        "In this frame, `node` is evaluated after `on`, though no route leads from the one to the other.",
+        move |node: Node, on: Node| {
+            stage.may_change()?;
+            stage.may_write(node, "", None)?;
+            let ordered = stage.write(|graph| graph.depend_for_this_frame(node.0, on.0));
+            ordered.map_err(|error| stage.fault_at(node, "", error.to_string()).into()) as Outcome<()>
+        },
+    );
+}
+
+const MODES: [(&str, Mode); 3] = [("on_change", Mode::OnChange), ("always", Mode::Always), ("pull", Mode::Pull)];
+
+fn evaluate_when(stage: &Stage, node: Node, given: &str) -> Outcome<()> {
+    stage.may_change()?;
+    stage.may_write(node, "", None)?;
+    let Some((_, mode)) = MODES.into_iter().find(|(name, _)| *name == given) else {
+        let names = MODES.map(|(name, _)| name);
+        return fail(format!("a node is evaluated {}; there is no `{given}`{}", names.join(", "), hint(given, names)));
+    };
+    let is_evaluated = stage.read(|graph| graph.contains(node.0) && !matches!(graph.type_of(node.0).evaluator, Evaluator::None));
+    if !is_evaluated {
+        return stage.fault_at(node, "", format!("{} has no evaluate of its own", stage.label(node))).throw();
+    }
+    stage.write(|graph| graph.set_mode(node.0, mode)).map_err(|error| stage.fault_at(node, "", error.to_string()).into())
 }
 
 fn route(stage: &Stage, from: (Node, &str), to: (Node, &str), strength: Strength) -> Outcome<()> {
