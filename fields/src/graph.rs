@@ -46,7 +46,7 @@ pub(crate) struct Node {
     pub(crate) node_type: Arc<NodeType>,
     pub(crate) name: Option<Arc<str>>,
     /// By field index: the slot in the column of the field's type, or `FREE` where a dynamic field was removed.
-    pub(crate) slots: SmallVec<[u32; 8]>,
+    pub(crate) slots: SmallVec<[u32; 6]>,
     /// Fields beyond the declared ones.
     pub(crate) dynamic: Vec<Option<Field>>,
     /// Routes to its fields and from them; each route knows its place here.

@@ -1,14 +1,11 @@
 //! Values that are nothing but a few floats, which most of what changes every frame is: their bytes are those of the codec, but they go
 //! to and from columns without a [`Value`](crate::Value) and without serde.
 
-use std::ops::Range;
-
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 
 use super::herd::{Herds, Rows, Seat, Strand};
 use super::packet::{Draft, FieldOf, GroupRead, Place};
-use super::runs::Run;
-use super::shares::{flat_share, seed_of, seed_step, update_shares};
+use super::shares::flat_share;
 use super::{ReplicaError, damaged};
 use crate::column::{Column, Columns};
 use crate::{Color, ColorA, FieldType, FieldValue, Graph, Revision};
@@ -108,21 +105,6 @@ pub(super) fn gather_flat(
     ) -> u64 {
         let (column, mut added) = (T::column(columns), 0u64);
         draft.group(T::TYPE, FieldOf::Type(index), |bytes, runs| {
-            if let Some((run, places)) = row_of(nodes)
-                && let Some(seeds) = even_seeds(&numbers[places.clone()], index)
-                && let Some((first, step)) = even_step(&strand.slots[places.clone()])
-                && column.revisions[first..].iter().step_by(step).take(nodes.len()).fold(true, |all, last| all & (*last > mark))
-            {
-                runs.push_run(run);
-                let start = bytes.len();
-                bytes.resize(start + 4 * COUNT * nodes.len(), 0);
-                let values = column.values[first..].iter().step_by(step);
-                for (bytes, value) in bytes[start..].chunks_exact_mut(4 * COUNT).zip(values) {
-                    bytes.copy_from_slice(value.floats().map(f32::to_le_bytes).as_flattened());
-                }
-                added = added.wrapping_add(update_shares::<COUNT>(&mut strand.shares[places], &bytes[start..], seeds));
-                return;
-            }
             for (slot, place) in nodes {
                 let place = *place as usize;
                 let at = strand.slots[place] as usize;
@@ -142,34 +124,6 @@ pub(super) fn gather_flat(
     let added = for_flat!(strand.1.field_type, gather(columns, strand, index, nodes, mark, draft))?;
     herds.add(added);
     Some(())
-}
-
-/// The run and the places of nodes, given as slots and places, if the slots are even steps apart and the places side by side.
-fn row_of(nodes: &[(u32, u32)]) -> Option<(Run, Range<usize>)> {
-    let [(first, place), (second, _), ..] = *nodes else { return None };
-    let step = second.checked_sub(first)?;
-    let differ = nodes
-        .iter()
-        .zip(&nodes[1..])
-        .fold(0, |differ, (a, b)| differ | (b.0.wrapping_sub(a.0) ^ step) | (b.1.wrapping_sub(a.1) ^ 1));
-    let run = Run { first, step, count: nodes.len() as u32 };
-    (differ == 0).then_some((run, place as usize..place as usize + nodes.len()))
-}
-
-/// The first of several numbers that go up in equal steps, and the step.
-fn even_step(numbers: &[u32]) -> Option<(usize, usize)> {
-    let [first, second, ..] = *numbers else { return None };
-    let step = second.checked_sub(first).filter(|step| *step > 0)?;
-    let differ = numbers.iter().zip(&numbers[1..]).fold(0, |differ, (a, b)| differ | (b.wrapping_sub(*a) ^ step));
-    (differ == 0).then_some((first as usize, step as usize))
-}
-
-/// What the hashes of a field of several nodes begin with, if that goes up in equal steps with the nodes' numbers: the first, and the step.
-fn even_seeds(numbers: &[u64], index: u16) -> Option<(u64, u64)> {
-    let [first, second, ..] = *numbers else { return None };
-    let step = second.wrapping_sub(first);
-    let differ = numbers.iter().zip(&numbers[1..]).fold(0, |differ, (a, b)| differ | (b.wrapping_sub(*a) ^ step));
-    (differ == 0).then(|| (seed_of(first, index), seed_step(step)))
 }
 
 /// Writes a group of a packet to the nodes' fields; None if its values are not flat. The hash follows what stands there then.
@@ -246,53 +200,27 @@ impl<T> Target<'_, T> {
     where
         T: Flat<COUNT>,
     {
-        let most = (bytes.len() / (4 * COUNT)).min(rows.numbers.len());
-        let (numbers, shares, bytes) = (&rows.numbers[..most], &mut rows.shares[..most], &bytes[..4 * COUNT * most]);
         let (values, revisions) = (&mut self.column.values[..], &mut self.column.revisions[..]);
-        if numbers.first().is_some_and(|number| *number as u32 == first)
-            && let Some(seeds) = even_seeds(numbers, index).filter(|seeds| seeds.1 == seed_step(step as u64))
-            && let Some((at, apart)) = even_step(&rows.slots[..most])
-        {
-            // One thing after the other: each needs few registers.
-            let floats = bytes.chunks_exact(4 * COUNT).map(floats_of);
-            values[at..].iter_mut().step_by(apart).zip(floats).for_each(|(value, floats)| *value = T::of_floats(floats));
-            revisions[at..].iter_mut().step_by(apart).take(most).for_each(|revision| *revision = self.revision);
-            self.touch(&rows.nodes[..most]);
-            return (most, update_shares::<COUNT>(shares, bytes, seeds));
-        }
-        let mut added = 0u64;
-        let (mut done, mut slot) = (0, first);
-        for (((number, at), share), bytes) in numbers.iter().zip(rows.slots).zip(shares).zip(bytes.chunks_exact(4 * COUNT)) {
+        let (revision, boundary) = (self.revision, self.boundary);
+        let (mut done, mut added, mut slot) = (0, 0u64, first);
+        let places = rows.numbers.iter().zip(rows.nodes).zip(rows.slots).zip(&mut *rows.shares);
+        for ((((number, node), at), share), bytes) in places.zip(bytes.chunks_exact(4 * COUNT)) {
             if *number as u32 != slot {
                 break;
             }
             let value = &mut values[*at as usize];
             *value = T::of_floats(floats_of(bytes));
+            // What stands there counts, not what was to be written.
             let stands = flat_share(*number, index, value.floats());
             added = added.wrapping_add(stands).wrapping_sub(std::mem::replace(share, stands));
-            revisions[*at as usize] = self.revision;
+            revisions[*at as usize] = revision;
+            if std::mem::replace(&mut self.nodes[*node as usize], revision) <= boundary {
+                self.written.push(*node);
+            }
             done += 1;
             slot = slot.wrapping_add(step);
         }
-        self.touch(&rows.nodes[..done]);
         (done, added)
-    }
-
-    /// Notes that nodes were written.
-    fn touch(&mut self, nodes: &[u32]) {
-        let revision = self.revision;
-        // Nearly always they stand side by side, and were logged with another of their fields.
-        if let Some((first, 1)) = even_step(nodes)
-            && let Some(last) = self.nodes.get_mut(first..first + nodes.len())
-            && last.iter().fold(true, |all, last| all & (*last > self.boundary))
-        {
-            return last.fill(revision);
-        }
-        for node in nodes {
-            if std::mem::replace(&mut self.nodes[*node as usize], revision) <= self.boundary {
-                self.written.push(*node);
-            }
-        }
     }
 }
 

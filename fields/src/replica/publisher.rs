@@ -16,9 +16,6 @@ use crate::column::FREE;
 use crate::graph::Node;
 use crate::{Changes, Field, FieldId, FieldType, Graph, Image, NodeId, NodeType, Revision};
 
-/// So many nodes are read and written with all their fields before the next, so that these are still in the processor's cache.
-const BLOCK: usize = 512;
-
 /// What makes a dynamic field the same one: name, type, choices.
 type Declared = (Arc<str>, FieldType, Arc<[Arc<str>]>);
 
@@ -184,13 +181,10 @@ impl Publisher {
             }
         }
         let written = std::mem::take(&mut self.written);
-        for (herd, nodes) in written.iter().enumerate() {
-            // Fields of a node lie near each other in memory, at both ends.
-            for nodes in nodes.chunks(BLOCK) {
-                for index in 0..self.herds.herds[herd].strands.len() as u16 {
-                    if gather_flat(&graph.columns, &mut self.herds, herd, index, nodes, self.mark, draft).is_none() {
-                        self.others(graph, herd, index, nodes, draft);
-                    }
+        for (herd, nodes) in written.iter().enumerate().filter(|(_, nodes)| !nodes.is_empty()) {
+            for index in 0..self.herds.herds[herd].strands.len() as u16 {
+                if gather_flat(&graph.columns, &mut self.herds, herd, index, nodes, self.mark, draft).is_none() {
+                    self.others(graph, herd, index, nodes, draft);
                 }
             }
         }

@@ -42,11 +42,6 @@ impl RunWriter {
         self.runs.push(Run { first: slot, step: 0, count: 1 });
     }
 
-    /// The same for slots in equal steps that come at once.
-    pub(super) fn push_run(&mut self, run: Run) {
-        self.runs.push(run);
-    }
-
     pub(super) fn is_empty(&self) -> bool {
         self.runs.is_empty()
     }

@@ -13,16 +13,9 @@ fn fold(a: u64, b: u64) -> u64 {
     product as u64 ^ (product >> 64) as u64
 }
 
-/// What the hash of a field begins with.
 #[inline]
-pub(super) fn seed_of(number: u64, index: u16) -> u64 {
-    number.wrapping_mul(SECRETS[0]).wrapping_add((index as u64 + 1).wrapping_mul(SECRETS[1]))
-}
-
-/// By how much it grows from a node to another, whose number is so much greater.
-#[inline]
-pub(super) fn seed_step(numbers: u64) -> u64 {
-    numbers.wrapping_mul(SECRETS[0])
+fn seed_of(number: u64, index: u16) -> u64 {
+    number.wrapping_mul(SECRETS[0]) ^ (index as u64 + 1).wrapping_mul(SECRETS[1])
 }
 
 /// What a field adds. `number` is its node's in the application, `index` the field's place there.
@@ -33,35 +26,13 @@ pub(super) fn field_share(number: u64, index: u16, bytes: &[u8]) -> u64 {
 /// What a field of a few floats adds.
 #[inline]
 pub(super) fn flat_share<const COUNT: usize>(number: u64, index: u16, floats: [f32; COUNT]) -> u64 {
-    share_of_bytes::<COUNT>(seed_of(number, index), floats.map(f32::to_le_bytes).as_flattened())
-}
-
-/// The same for the bytes of the floats, little end first, with what the hash begins with.
-#[inline]
-fn share_of_bytes<const COUNT: usize>(seed: u64, bytes: &[u8]) -> u64 {
-    let word = |at: usize| match bytes.get(at..) {
-        Some([a, b, c, d, e, f, g, h, ..]) => u64::from_le_bytes([*a, *b, *c, *d, *e, *f, *g, *h]),
-        Some([a, b, c, d, ..]) => u32::from_le_bytes([*a, *b, *c, *d]) as u64,
-        _ => 0,
-    };
-    let mut state = seed;
-    for place in (0..4 * COUNT).step_by(16) {
-        state = fold(word(place) ^ SECRETS[2], word(place + 8) ^ state);
+    let word = |place: usize| floats.get(place).map_or(0, |float| float.to_bits() as u64);
+    let mut state = seed_of(number, index);
+    for place in (0..COUNT).step_by(4) {
+        let (low, high) = (word(place) | word(place + 1) << 32, word(place + 2) | word(place + 3) << 32);
+        state = fold(low ^ SECRETS[2], high ^ state);
     }
     fold(state ^ SECRETS[0], SECRETS[1] ^ COUNT as u64).max(1)
-}
-
-/// Brings the shares of a field of several nodes up to date with its bytes, value after value; gives what that adds to the hash. `seeds` is
-/// what the first begins with, and by how much that grows from one to the next.
-#[inline]
-pub(super) fn update_shares<const COUNT: usize>(shares: &mut [u64], bytes: &[u8], seeds: (u64, u64)) -> u64 {
-    let (mut seed, mut added) = (seeds.0, 0u64);
-    for (share, bytes) in shares.iter_mut().zip(bytes.chunks_exact(4 * COUNT)) {
-        let new = share_of_bytes::<COUNT>(seed, bytes);
-        added = added.wrapping_add(new).wrapping_sub(std::mem::replace(share, new));
-        seed = seed.wrapping_add(seeds.1);
-    }
-    added
 }
 
 /// What a node adds by its type and name.
