@@ -25,6 +25,8 @@ pub(crate) const SURFACE_BEFORE_HOOKS: &[&str] = &[
     include_str!("shaders/shade.wgsl"),
     include_str!("shaders/brdf.wgsl"),
     include_str!("shaders/shadow_map.wgsl"),
+    include_str!("shaders/shadow_filter.wgsl"),
+    include_str!("shaders/shadow_disc.wgsl"),
     include_str!("shaders/soft_shadow.wgsl"),
     include_str!("shaders/projection.wgsl"),
 ];

@@ -1,5 +1,5 @@
 // Surfaces as the eye sees them. Concatenated after shaders/{position,view,instance,material,light,shade,brdf,
-// shadow_map,projection}, the functions that a shape's own shader may replace (`author/`), and shaders/layers.
+// shadow_map,shadow_filter,shadow_disc,projection}, the functions that a shape's own shader may replace (`author/`), and shaders/layers.
 
 struct Vertex {
     @location(0) position: vec3<f32>,
