@@ -96,6 +96,9 @@ fn place(f: Fragment, covered: u32) -> Surface {
     if dot(s.face_normal, s.towards_eye) < 0.0 {
         s.face_normal = -s.face_normal;
     }
+    if (f.flags & FLAT) != 0u {
+        n = s.face_normal;
+    }
     // The side that is seen, whatever the winding says: real models have triangles that turn against their normals.
     let side = select(-1.0, 1.0, dot(n, s.face_normal) >= 0.0);
     if has_texture(2u) {

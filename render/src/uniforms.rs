@@ -42,6 +42,8 @@ impl Instance {
     pub(crate) const RECEIVES_SHADOW: u32 = 1;
     /// Its matrix mirrors.
     pub(crate) const MIRRORED: u32 = 2;
+    /// Its mesh is flat.
+    pub(crate) const FLAT: u32 = 4;
     /// From this bit on, 16 bits are the number of the list of lights that it receives, counted from 1.
     pub(crate) const RECEIVE_LIST_SHIFT: u32 = 8;
 }

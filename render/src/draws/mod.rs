@@ -242,7 +242,8 @@ impl Draws {
         let receives = if d.receives_shadow { Instance::RECEIVES_SHADOW | list } else { 0 };
         let is_same = before.flags != 0 && before.world_from_object == d.world_from_object.to_cols_array_2d();
         let mut instance = if is_same { *before } else { instance_of(&d.world_from_object) };
-        instance.flags = (instance.flags & Instance::MIRRORED) | receives | PRESENT;
+        let flat = if d.mesh.flat { Instance::FLAT } else { 0 };
+        instance.flags = (instance.flags & Instance::MIRRORED) | flat | receives | PRESENT;
         instance
     }
 

@@ -7,5 +7,6 @@ struct Instance {
 
 const RECEIVES_SHADOW: u32 = 1u;
 const MIRRORED: u32 = 2u;
+const FLAT: u32 = 4u;
 
 @group(1) @binding(0) var<storage, read> instances: array<Instance>;

@@ -156,3 +156,21 @@ fn vertex_colours_multiply() {
     let colour = floor_colour("vertex_colours", mesh, matt(0.8, 0.4, 0.8), Vec3::new(0.0, 4.0, 0.0), 0.0);
     assert_colour(colour, [0.4 * lit, 0.4 * lit, 0.2 * lit], "vertex colours");
 }
+
+/// Of a box whose corners are shared and that brings no normals, each side has one colour.
+#[test]
+fn meshes_without_normals_are_flat() {
+    let corners = [-1.0, 1.0].map(|x| [-1.0, 1.0].map(|y| [-1.0, 1.0].map(|z| Vec3::new(x, y, z))));
+    let indices = [0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3];
+    let mesh = Mesh { positions: corners.concat().concat().into(), indices: indices.into(), ..Default::default() };
+    let scene = Scene {
+        drawables: vec![shape(mesh.checked().unwrap(), matt(0.8, 0.8, 0.8), Mat4::IDENTITY)].into(),
+        lights: vec![Light { direction: Vec3::new(-0.3, -1.0, -0.6).normalize(), ..noon() }],
+        ..Default::default()
+    };
+    let shot = shoot(&scene, &Picture::mono(look("flat", Vec3::new(3.0, 4.0, 5.0), Vec3::ZERO, [96, 96])));
+    let mut colours: Vec<[u8; 4]> = shot.layers[0].rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
+    colours.sort_unstable();
+    let wide = colours.chunk_by(|a, b| a == b).filter(|same| same.len() > 300).count();
+    assert_eq!(wide, 4, "three sides and the background");
+}

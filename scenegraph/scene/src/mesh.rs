@@ -15,6 +15,8 @@ pub struct Mesh {
     pub positions: Arc<[Vec3]>,
     /// Unit normals.
     pub normals: Arc<[Vec3]>,
+    /// Shaded as the triangles lie, whatever `normals` says.
+    pub flat: bool,
     /// Unit tangents; w is the sign of the bitangent.
     pub tangents: Arc<[Vec4]>,
     /// First texture coordinates, v down.
@@ -106,12 +108,14 @@ pub enum MeshError {
 }
 
 impl Mesh {
-    /// Checks lengths, indices and finiteness, computes `bounds`, and fills in flat-smooth normals where there are none.
+    /// Checks lengths, indices and finiteness, computes `bounds`, and lets triangles without normals be flat (glTF 2.0,
+    /// section 3.7.2.1), with smooth ones for what wants one for each vertex.
     pub fn checked(mut self) -> Result<Mesh, MeshError> {
         self.verify()?;
         self.bounds = Aabb::from_points(self.positions.iter().copied());
         if self.normals.is_empty() && self.topology == Topology::Triangles {
             self.normals = area_weighted_normals(&self.positions, &self.indices).into();
+            self.flat = true;
         }
         Ok(self)
     }

@@ -75,6 +75,7 @@ pub(crate) fn mesh_from_fields(f: MeshFields) -> Result<Mesh, MeshProblem> {
         topology: f.topology,
         positions: f.position,
         normals: f.normal,
+        flat: false,
         tangents: f.tangent,
         uv0: f.tex_coord,
         uv1: f.tex_coord1,

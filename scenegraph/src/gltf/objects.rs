@@ -125,6 +125,7 @@ fn mesh_of(name: &str, s: &Surface) -> Mesh {
         bounds: Aabb::from_points(s.position.iter().copied()),
         positions: s.position.clone(),
         normals: s.normal.clone(),
+        flat: s.normal.is_empty(),
         tangents: s.tangent.clone(),
         uv0: s.tex_coord[0].clone(),
         uv1: s.tex_coord[1].clone(),

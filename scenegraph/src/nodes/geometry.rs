@@ -68,7 +68,7 @@ fn meshes() -> Vec<NodeType> {
         NodeType::new("Mesh", "Triangles, lines or points as the author made them.")
             .field(Field::choice("topology", &["triangles", "lines", "points"], "triangles").doc("What each run of indices is."))
             .field(Field::many::<Vec3>("position").unit("m").alias("coord").doc("Place of each vertex."))
-            .field(Field::many::<Vec3>("normal").doc("Unit normal of each vertex; empty: computed from the triangles."))
+            .field(Field::many::<Vec3>("normal").doc("Unit normal of each vertex; empty: each triangle is flat."))
             .field(Field::many::<Vec4>("tangent").doc("Unit tangent of each vertex; w is the sign of the bitangent."))
             .field(Field::many::<Vec2>("tex_coord").doc("Texture coordinates of each vertex, v down."))
             .field(Field::many::<Vec2>("tex_coord1").doc("Second texture coordinates."))

@@ -69,6 +69,7 @@ pub(super) fn applied(mesh: &Mesh, mended: &Mended) -> Mesh {
         name: mesh.name.clone(),
         topology: mesh.topology,
         normals: normals.into(),
+        flat: mesh.flat,
         tangents,
         uv0: grown(&mesh.uv0, add, |x, y, share| x.lerp(y, share)),
         uv1: grown(&mesh.uv1, add, |x, y, share| x.lerp(y, share)),
