@@ -179,6 +179,11 @@ impl Follower {
         self.line.is_near()
     }
 
+    /// True if the application is heard down the short line of displays of its machine, and not over the network.
+    pub fn is_beside(&self) -> bool {
+        self.line.is_short()
+    }
+
     /// The world here, once it came.
     pub fn replica(&self) -> Option<&Replica> {
         self.replica.as_ref()
@@ -215,11 +220,10 @@ impl Follower {
         loop {
             self.line.settle();
             let left = until.saturating_duration_since(Instant::now());
-            if let Ok(arrived) = self.line.arrived.recv_timeout(left.min(Duration::from_millis(5))) {
-                self.handle(arrived, screen)?;
-                while let Ok(arrived) = self.line.arrived.try_recv() {
-                    self.handle(arrived, screen)?;
-                }
+            let mut arrived = self.line.next(left.min(Duration::from_millis(5)));
+            while let Some(next) = arrived {
+                self.handle(next, screen)?;
+                arrived = self.line.next(Duration::ZERO);
             }
             self.step(DisplayEvent::Tick, screen)?;
             if self.told.0 == self.lock.epoch() {
@@ -302,6 +306,7 @@ impl Follower {
             }
             Arrived::Application(false) if self.is_over => {}
             Arrived::Application(false) => {
+                self.line.begin();
                 tracing::warn!("display `{}`: the application is gone; waiting for it to come back", self.name);
                 self.alone_since = Some(Instant::now());
             }
@@ -359,7 +364,10 @@ impl Follower {
                         let name = self.name.clone();
                         let (epoch, took_us) = (self.lock.epoch(), self.took.as_micros() as u64);
                         let ready = Ready { display: self.line.id, name, epoch, frame, took_us, hash };
-                        put(&self.ready, &bytes_of(&ready));
+                        let bytes = bytes_of(&ready);
+                        if !self.line.say_ready(&bytes) {
+                            put(&self.ready, &bytes);
+                        }
                     }
                     DisplayAction::Show(frame) => {
                         screen.show(frame)?;

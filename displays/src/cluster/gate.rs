@@ -126,6 +126,7 @@ impl Gate {
     pub(super) fn stage(&mut self, staged: Staged) {
         self.staged = Some(staged);
         self.publish();
+        self.outlets.neighbours.send();
     }
 
     /// A display has drawn a frame.
@@ -167,6 +168,7 @@ impl Gate {
         if let Some(name) = self.names.remove(&number) {
             tracing::info!("display `{name}` is gone");
         }
+        self.outlets.neighbours.close(number);
         self.step(ApplicationEvent::Gone(DisplayId(number)));
     }
 
@@ -184,6 +186,8 @@ impl Gate {
         let before = (self.staged.is_some(), self.lock.waits());
         self.act(event);
         self.publish();
+        // A release and the frame after it wake a display once.
+        self.outlets.neighbours.send();
         if self.is_awaited && before != (self.staged.is_some(), self.lock.waits()) {
             (self.wake)();
         }

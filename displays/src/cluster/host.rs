@@ -16,8 +16,9 @@ use super::event::Input;
 use super::gate::{Gate, HostReport, SharedGate, Staged, enter};
 use super::memory::Shelf;
 use super::message::{APPLICATION, BULK, DISPLAY, INPUT, Join, PROTOCOL, READY, SNAPSHOT, message_of, stamped};
+use super::neighbours::Listening;
 use super::outlets::{Outlets, Parcel};
-use super::transport::{ClusterError, End, Security, network, open};
+use super::transport::{ClusterError, End, Security, network, open, port_of};
 
 /// How an application is reached.
 #[derive(Clone, Debug)]
@@ -61,6 +62,7 @@ pub struct Host {
     snapshot: Option<(u64, Arc<[u8]>)>,
     refused_last: Option<String>,
     _held: (Vec<Subscriber<()>>, Vec<Queryable<()>>, LivelinessToken),
+    _listening: Option<Listening>,
     session: Session,
 }
 
@@ -121,12 +123,16 @@ impl Host {
             queryables.push(queryable.wait().map_err(network)?);
         }
         let token = session.liveliness().declare_token(APPLICATION).wait().map_err(network)?;
-        let shelf = Shelf::make().inspect_err(|error| tracing::debug!("no memory for displays of this machine: {error}"));
+        let shelf = Shelf::make().inspect_err(|error| tracing::debug!("no memory for displays of this machine: {error}")).ok();
+        let listening = shelf.as_ref().zip(port_of(&options.listen)).and_then(|(shelf, port)| {
+            let started = Listening::start(port, shelf.token(), outlets.neighbours.clone(), gate.clone());
+            started.inspect_err(|error| tracing::debug!("no short line for displays of this machine: {error}")).ok()
+        });
         Ok(Host {
             arrived,
             replies: replies(),
             outlets,
-            shelf: shelf.ok(),
+            shelf,
             gate,
             publisher: Publisher::new(),
             epoch,
@@ -134,6 +140,7 @@ impl Host {
             snapshot: None,
             refused_last: None,
             _held: (subscribers, queryables, token),
+            _listening: listening,
             session,
         })
     }

@@ -1,6 +1,7 @@
 //! The link to the application, as displays and guests hold it: what comes in stands in one queue.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use crossbeam::channel::{Receiver, Sender, unbounded};
@@ -11,7 +12,9 @@ use zenoh::{Session, Wait};
 
 use super::frames::Frames;
 use super::message::{APPLICATION, BULK};
-use super::transport::{ClusterError, End, Security, network, open};
+use super::near::{Bell, Word};
+use super::short::Short;
+use super::transport::{ClusterError, End, Security, network, open, port_of};
 
 /// How long an answer may take.
 const ANSWER: Duration = Duration::from_secs(5);
@@ -32,18 +35,41 @@ pub(super) struct Link<'a> {
     pub(super) uses_memory: bool,
 }
 
+/// Where things arrive; rings for who waits at the short line.
+struct Post<A> {
+    sender: Sender<A>,
+    bell: Arc<Bell>,
+}
+
+impl<A> Clone for Post<A> {
+    fn clone(&self) -> Post<A> {
+        Post { sender: self.sender.clone(), bell: self.bell.clone() }
+    }
+}
+
+impl<A> Post<A> {
+    fn send(&self, arrived: A) {
+        let _ = self.sender.send(arrived);
+        self.bell.ring();
+    }
+}
+
 /// A link; `A` is what arrives.
 pub(super) struct Line<A> {
     pub(super) session: Session,
     /// Of this process, unlike any other's.
     pub(super) id: u64,
-    pub(super) arrived: Receiver<A>,
-    sender: Sender<A>,
+    arrived: Receiver<A>,
+    post: Post<A>,
     /// Long values that were asked for and have not come.
     asked: BTreeSet<u64>,
     frames: Frames,
+    subject: Subject<A>,
+    /// Told of the subject, unless it is the short line that tells.
+    over_network: Option<Subscriber<()>>,
+    short: Short,
     _token: Option<LivelinessToken>,
-    _subscribers: Vec<Subscriber<()>>,
+    _alive: Subscriber<()>,
 }
 
 impl<A: Send + 'static> Line<A> {
@@ -52,31 +78,68 @@ impl<A: Send + 'static> Line<A> {
     pub(super) fn open(
         Link { end, endpoint, security, lease, uses_memory }: Link<'_>,
         frame: fn(Vec<u8>) -> A,
-        (key, kind): Subject<A>,
+        subject: Subject<A>,
         application: fn(bool) -> A,
     ) -> Result<Line<A>, ClusterError> {
         let session = open(endpoint, security, end, lease)?;
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
         let id = since ^ (std::process::id() as u64) << 40;
         let (sender, arrived) = unbounded();
-        let framed = sender.clone();
-        let frames = Frames::follow(&session, uses_memory, move |bytes| drop(framed.send(frame(bytes))))?;
-        let told = sender.clone();
-        let take = move |sample: Sample| drop(told.send(kind(sample.payload().to_bytes().into_owned())));
-        let mut subscribers = vec![session.declare_subscriber(key).callback(take).wait().map_err(network)?];
-        let told = sender.clone();
-        let alive = session.liveliness().declare_subscriber(APPLICATION).history(true).callback(move |sample| {
-            let _ = told.send(application(sample.kind() == SampleKind::Put));
-        });
-        subscribers.push(alive.wait().map_err(network)?);
-        Ok(Line { session, id, arrived, sender, asked: BTreeSet::new(), frames, _token: None, _subscribers: subscribers })
+        let post = Post { sender, bell: Arc::new(Bell::new()) };
+        let framed = post.clone();
+        let frames = Frames::follow(&session, uses_memory, move |bytes| framed.send(frame(bytes)))?;
+        let told = post.clone();
+        let alive = session.liveliness().declare_subscriber(APPLICATION).history(true);
+        let alive = alive.callback(move |sample| told.send(application(sample.kind() == SampleKind::Put)));
+        let _alive = alive.wait().map_err(network)?;
+        let short = Short::at(port_of(endpoint).filter(|_| end == End::Display && uses_memory));
+        let (asked, over_network) = (BTreeSet::new(), None);
+        let mut line = Line { session, id, arrived, post, asked, frames, subject, over_network, short, _token: None, _alive };
+        line.follow()?;
+        Ok(line)
     }
 
     /// Keeps the one way of frames that works. To be called in each turn.
     pub(super) fn settle(&mut self) {
-        if let Err(error) = self.frames.settle() {
+        if let Some((_, token)) = self.frames.memory() {
+            self.short.look(token, self.id);
+        }
+        if let Err(error) = self.follow() {
             tracing::debug!("cannot follow: {error}");
         }
+    }
+
+    fn follow(&mut self) -> Result<(), ClusterError> {
+        let is_told = self.short.is_told() && self.frames.is_near();
+        self.frames.settle(is_told)?;
+        if is_told {
+            self.over_network = None;
+        } else if self.over_network.is_none() {
+            let ((key, kind), post) = (self.subject, self.post.clone());
+            let take = move |sample: Sample| post.send(kind(sample.payload().to_bytes().into_owned()));
+            self.over_network = Some(self.session.declare_subscriber(key).callback(take).wait().map_err(network)?);
+        }
+        Ok(())
+    }
+
+    /// What arrives next within some time.
+    pub(super) fn next(&mut self, patience: Duration) -> Option<A> {
+        let arrived = self.arrived.try_recv().ok();
+        if arrived.is_some() || patience.is_zero() {
+            return arrived;
+        }
+        let Line { frames, short, post, subject: (_, kind), .. } = self;
+        let waited = short.wait(&post.bell, patience, |word, message| match (word, frames.memory()) {
+            (Word::Here, Some((memory, _))) => memory.read(message),
+            (Word::Release, _) => post.send(kind(message.to_vec())),
+            _ => {}
+        });
+        if waited { self.arrived.try_recv().ok() } else { self.arrived.recv_timeout(patience).ok() }
+    }
+
+    /// Says down the short line that a frame is drawn; false if it is to be said over the network.
+    pub(super) fn say_ready(&mut self, message: &[u8]) -> bool {
+        self.short.is_told() && self.short.say(Word::Ready, message)
     }
 
     /// True if frames come out of the application's memory.
@@ -84,13 +147,19 @@ impl<A: Send + 'static> Line<A> {
         self.frames.is_near()
     }
 
+    /// True if the application tells of frames down the short line.
+    pub(super) fn is_short(&self) -> bool {
+        self.short.is_told()
+    }
+
     /// Takes the memory of a frame's packet that is not needed any more.
     pub(super) fn reuse(&self, bytes: Vec<u8>) {
         self.frames.reuse(bytes);
     }
 
-    /// An application came.
+    /// An application came, or went.
     pub(super) fn begin(&mut self) {
+        self.short.begin();
         self.frames.begin();
     }
 
@@ -103,13 +172,13 @@ impl<A: Send + 'static> Line<A> {
 
     /// Asks the application; the answer arrives.
     pub(super) fn get(&self, key: String, payload: Vec<u8>, arrived: impl Fn(Answer) -> A + Send + Sync + 'static) {
-        let sender = self.sender.clone();
+        let post = self.post.clone();
         let sent = self.session.get(key).payload(payload).timeout(ANSWER).callback(move |reply| {
             let answer = match reply.into_result() {
                 Ok(sample) => Ok(sample.payload().to_bytes().into_owned()),
                 Err(error) => Err(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()),
             };
-            let _ = sender.send(arrived(answer));
+            post.send(arrived(answer));
         });
         if let Err(error) = sent.wait() {
             tracing::debug!("cannot ask: {error}");

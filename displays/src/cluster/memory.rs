@@ -25,7 +25,7 @@ pub(super) struct Whereabouts {
     /// The descriptor in that process.
     file: i32,
     /// Of this memory, unlike any other's; zero for none.
-    token: u64,
+    pub(super) token: u64,
     number: u64,
     at: u64,
     length: u64,
@@ -49,6 +49,11 @@ impl Shelf {
     /// The system has none to share.
     pub(super) fn make() -> Result<Shelf> {
         Ok(Shelf { file: nameless()?, token: fastrand::u64(1..), number: 0, gone: 0, place_bytes: 0 })
+    }
+
+    /// What tells it from others.
+    pub(super) fn token(&self) -> u64 {
+        self.token
     }
 
     /// Writes a packet, over one that was written long ago.

@@ -26,6 +26,10 @@ mod memory;
 #[cfg(feature = "cluster")]
 mod message;
 #[cfg(feature = "cluster")]
+mod near;
+#[cfg(feature = "cluster")]
+mod neighbours;
+#[cfg(feature = "cluster")]
 mod ordered;
 #[cfg(feature = "cluster")]
 mod outlets;
@@ -33,6 +37,8 @@ mod outlets;
 mod proxy;
 #[cfg(feature = "cluster")]
 mod rights;
+#[cfg(feature = "cluster")]
+mod short;
 #[cfg(feature = "cluster")]
 mod transport;
 #[cfg(feature = "cluster")]

@@ -6,6 +6,8 @@ use zenoh::{Session, Wait};
 
 use super::memory::{Shelf, Whereabouts};
 use super::message::{FRAME, HERE, RELEASE, Release, bytes_of};
+use super::near::Word;
+use super::neighbours::Neighbours;
 use super::transport::{ClusterError, network};
 
 /// Where frames and releases go out. All may be dropped: a gap is repaired by a snapshot.
@@ -15,6 +17,8 @@ pub(super) struct Outlets {
     /// Where they lie, for who is near.
     here: Publisher<'static>,
     releases: Publisher<'static>,
+    /// Who hears of both down a short line.
+    pub(super) neighbours: Neighbours,
 }
 
 /// A packet that is ready to go: itself, where somebody wants it over the network, and where it lies.
@@ -28,7 +32,8 @@ impl Parcel {
     /// Puts a packet into memory where somebody reads it there. Gives the packet back if nobody wants it otherwise.
     pub(super) fn new(packet: Vec<u8>, shelf: &mut Option<Shelf>, outlets: &Outlets) -> (Parcel, Option<Vec<u8>>) {
         let length = packet.len() as u64;
-        let put = shelf.as_mut().filter(|_| is_heard(&outlets.here)).map(|shelf| shelf.put(&packet));
+        let put =
+            shelf.as_mut().filter(|_| outlets.neighbours.listen() || is_heard(&outlets.here)).map(|shelf| shelf.put(&packet));
         let whereabouts = put.map(|put| {
             put.unwrap_or_else(|error| {
                 tracing::warn!("no memory for displays of this machine: {error}; they are served over the network");
@@ -61,12 +66,15 @@ impl Outlets {
             // Of one priority, so that a frame does not overtake the release of the one before.
             here: declare(HERE, Priority::RealTime)?,
             releases: declare(RELEASE, Priority::RealTime)?,
+            neighbours: Neighbours::default(),
         })
     }
 
     pub(super) fn send(&self, frame: u64, parcel: Parcel) {
         if let Some(whereabouts) = &parcel.whereabouts {
-            warn(self.here.put(bytes_of(whereabouts)).wait(), "frame", frame);
+            let bytes = bytes_of(whereabouts);
+            self.neighbours.tell(Word::Here, &bytes);
+            warn(self.here.put(bytes).wait(), "frame", frame);
         }
         if !parcel.packet.is_empty() {
             warn(self.frames.put(parcel.packet).wait(), "frame", frame);
@@ -74,7 +82,9 @@ impl Outlets {
     }
 
     pub(super) fn release(&self, release: &Release) {
-        warn(self.releases.put(bytes_of(release)).wait(), "release of frame", release.frame);
+        let bytes = bytes_of(release);
+        self.neighbours.tell(Word::Release, &bytes);
+        warn(self.releases.put(bytes).wait(), "release of frame", release.frame);
     }
 }
 

@@ -1,10 +1,14 @@
-//! A proxy between a display and its application that delays, stalls or cuts the line: faults for tests on one machine.
+//! A proxy between a display and its application that delays, stalls or cuts the line, and the short one beside it: faults for tests on one
+//! machine.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+
+#[cfg(target_os = "linux")]
+use super::near::{Ear, Pipe};
 
 /// How the line is.
 #[derive(Debug, Default)]
@@ -35,15 +39,32 @@ impl Proxy {
         let (line, started) = (proxy.line.clone(), proxy.started);
         std::thread::spawn(move || {
             for near in listener.incoming().flatten() {
-                let Ok(far) = TcpStream::connect(to) else { continue };
-                let (Ok(near_too), Ok(far_too)) = (near.try_clone(), far.try_clone()) else { continue };
-                let (there, back) = (line.clone(), line.clone());
-                std::thread::spawn(move || forward(near, far, &there, started));
-                std::thread::spawn(move || forward(far_too, near_too, &back, started));
+                if let Ok(far) = TcpStream::connect(to) {
+                    let _ = far.set_nodelay(true);
+                    let _ = near.set_nodelay(true);
+                    join(near, far, &line, started);
+                }
             }
         });
+        proxy.forward_short_lines(to.port());
         Ok(proxy)
     }
+
+    #[cfg(target_os = "linux")]
+    fn forward_short_lines(&self, to: u16) {
+        let Ok(ear) = Ear::open(self.port) else { return };
+        let (line, started) = (self.line.clone(), self.started);
+        std::thread::spawn(move || {
+            while let Ok(near) = ear.accept() {
+                if let Ok(far) = Pipe::connect(to) {
+                    join(near.0, far.0, &line, started);
+                }
+            }
+        });
+    }
+
+    #[cfg(not(target_os = "linux"))]
+    fn forward_short_lines(&self, _: u16) {}
 
     /// The port to connect to.
     pub fn port(&self) -> u16 {
@@ -67,8 +88,37 @@ impl Proxy {
     }
 }
 
-fn forward(mut from: TcpStream, mut to: TcpStream, line: &Line, started: Instant) {
-    let _ = to.set_nodelay(true);
+/// A stream of either line.
+trait Stream: Read + Write + Send + Sized + 'static {
+    fn again(&self) -> std::io::Result<Self>;
+    fn shut(&self);
+}
+
+macro_rules! stream {
+    ($stream:ty) => {
+        impl Stream for $stream {
+            fn again(&self) -> std::io::Result<Self> {
+                self.try_clone()
+            }
+            fn shut(&self) {
+                let _ = self.shutdown(std::net::Shutdown::Both);
+            }
+        }
+    };
+}
+stream!(TcpStream);
+#[cfg(target_os = "linux")]
+stream!(std::os::unix::net::UnixStream);
+
+/// Forwards what comes from either end to the other.
+fn join<S: Stream>(near: S, far: S, line: &Arc<Line>, started: Instant) {
+    let (Ok(near_too), Ok(far_too)) = (near.again(), far.again()) else { return };
+    let (there, back) = (line.clone(), line.clone());
+    std::thread::spawn(move || forward(near, far, &there, started));
+    std::thread::spawn(move || forward(far_too, near_too, &back, started));
+}
+
+fn forward<S: Stream>(mut from: S, mut to: S, line: &Line, started: Instant) {
     let mut buffer = vec![0; 65536];
     let mut dice = fastrand::Rng::with_seed(1);
     while let Ok(count) = from.read(&mut buffer)
@@ -91,6 +141,6 @@ fn forward(mut from: TcpStream, mut to: TcpStream, line: &Line, started: Instant
             break;
         }
     }
-    let _ = from.shutdown(std::net::Shutdown::Both);
-    let _ = to.shutdown(std::net::Shutdown::Both);
+    from.shut();
+    to.shut();
 }

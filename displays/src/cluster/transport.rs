@@ -113,11 +113,15 @@ impl End {
     }
 }
 
+/// The port of an endpoint.
+pub(super) fn port_of(endpoint: &str) -> Option<u16> {
+    endpoint.rsplit_once(':').and_then(|(_, port)| port.parse().ok())
+}
+
 fn check(endpoint: &str, security: &Security) -> Result<(), ClusterError> {
     let wrong = |fault: &str| ClusterError::Endpoint { endpoint: endpoint.into(), fault: fault.into() };
     let (protocol, address) = endpoint.split_once('/').ok_or_else(|| wrong("it names no protocol"))?;
-    let port = address.rsplit_once(':').and_then(|(_, port)| port.parse::<u16>().ok());
-    if port.is_none() {
+    if port_of(endpoint).is_none() {
         return Err(wrong("it has no port"));
     }
     match (protocol, security) {

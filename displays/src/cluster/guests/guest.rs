@@ -170,12 +170,12 @@ impl Guest {
             self.line.settle();
             let left = until.saturating_duration_since(Instant::now());
             let mut news = News::None;
-            let mut arrived = self.line.arrived.recv_timeout(left.min(Duration::from_millis(5))).ok();
+            let mut arrived = self.line.next(left.min(Duration::from_millis(5)));
             while let Some(next) = arrived {
                 if let Some(found) = self.handle(next)? {
                     news = found;
                 }
-                arrived = self.line.arrived.try_recv().ok();
+                arrived = self.line.next(Duration::ZERO);
             }
             self.ask_for_the_world();
             self.resend();
