@@ -52,7 +52,7 @@ impl Graph {
     }
 
     /// Writes a field. A value of another type is converted where [`crate::converts`] allows it; an enum takes its names and numbers too.
-    #[inline]
+    #[inline(always)]
     pub fn set(&mut self, field: FieldId, value: impl Into<Value>) -> Result<(), Error> {
         let value = value.into();
         match self.write_plain(field, &value) {
@@ -80,13 +80,18 @@ impl Graph {
     }
 
     /// The consequences of a write.
-    #[inline]
+    #[inline(always)]
     fn wrote(&mut self, field: FieldId) {
         self.schedule.mark(slot_of(field.node));
         if self.journal.is_some() || self.explain.is_some() {
-            self.note_write(field, false);
-            self.explain_write(field);
+            self.is_watched(field);
         }
+    }
+
+    #[cold]
+    fn is_watched(&mut self, field: FieldId) {
+        self.note_write(field, false);
+        self.explain_write(field);
     }
 
     /// Writes without asking for a turn, as nearly all writes are: to a declared field, whose type the value has, with nothing to be

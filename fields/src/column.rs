@@ -51,7 +51,7 @@ impl<T: FieldValue> Column<T> {
     }
 
     /// See [`Stretch::write`].
-    #[inline]
+    #[inline(always)]
     pub(crate) fn write(&mut self, slot: u32, value: T, compare: bool, revision: Revision) -> bool {
         self.whole().write(slot, value, compare, revision)
     }
@@ -84,7 +84,8 @@ impl<'a, T: FieldValue> Stretch<'a, T> {
     }
 
     /// Writes unless `compare` and nothing would change; says whether it wrote.
-    #[inline]
+    // Inlined, so that a value comes in registers: floats that lie on the stack one by one are read together only after a stall.
+    #[inline(always)]
     pub(crate) fn write(&mut self, slot: u32, value: T, compare: bool, revision: Revision) -> bool {
         let at = slot as usize - self.first;
         let place = &mut self.values[at];

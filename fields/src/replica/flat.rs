@@ -3,8 +3,9 @@
 
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 
-use super::herd::{Herds, Rows, Seat, Strand};
+use super::herd::{Herd, Herds, Rows, Seat, Strand, start_and_step};
 use super::packet::{Draft, FieldOf, GroupRead, Place};
+use super::runs::Run;
 use super::shares::flat_share;
 use super::{ReplicaError, damaged};
 use crate::column::{Column, Columns};
@@ -35,19 +36,21 @@ flat! {
     ColorA, 4: value => value.0.to_array(), floats => ColorA(floats.into());
 }
 
+/// So many values are gathered at a time: each step of the work is a loop of its own, and finds what the one before left in the first cache.
+const BLOCK: usize = 64;
+/// Fewer values are not worth finding out that they lie in equal steps.
+const FEW: usize = 8;
+
 /// Floats as bytes, little end first.
 #[inline]
 pub(super) fn put_floats<const COUNT: usize>(bytes: &mut Vec<u8>, floats: [f32; COUNT]) {
     bytes.extend_from_slice(floats.map(f32::to_le_bytes).as_flattened());
 }
 
-/// Floats from their bytes, of which there are four for each.
+/// Values of so many floats, each as its bits, from their bytes.
 #[inline]
-pub(super) fn floats_of<const COUNT: usize>(bytes: &[u8]) -> [f32; COUNT] {
-    std::array::from_fn(|place| {
-        let bytes = bytes.get(4 * place..4 * place + 4).and_then(|bytes| bytes.try_into().ok());
-        f32::from_le_bytes(bytes.unwrap_or_default())
-    })
+fn bits_of<const COUNT: usize>(bytes: &[u8]) -> impl Iterator<Item = [u32; COUNT]> {
+    bytes.as_chunks::<4>().0.as_chunks::<COUNT>().0.iter().map(|value| value.map(u32::from_le_bytes))
 }
 
 /// Calls a function for the type of fields that hold nothing but a few floats; None for other types.
@@ -79,19 +82,37 @@ pub(super) fn put_flat(columns: &Columns, field_type: FieldType, slot: u32, byte
 /// What a value in its column adds to the hash, if it is flat.
 pub(super) fn share_of_flat(columns: &Columns, field_type: FieldType, slot: u32, (number, index): Place) -> Option<u64> {
     fn share<T: Flat<COUNT>, const COUNT: usize>(columns: &Columns, slot: u32, number: u64, index: u16) -> u64 {
-        flat_share(number, index, T::column(columns).values[slot as usize].floats())
+        flat_share(number, index, T::column(columns).values[slot as usize].floats().map(f32::to_bits))
     }
     for_flat!(field_type, share(columns, slot, number, index))
 }
 
-/// Puts those values of a strand into a packet that were written after a revision; None if they are not flat. `nodes` are the slots and
-/// places of those that may have been.
+/// Nodes of a herd that were written.
+#[derive(Clone, Copy)]
+pub(super) struct Written<'a> {
+    /// Their slots and places, by slot.
+    pub(super) nodes: &'a [(u32, u32)],
+    /// Their places follow each other, and all that belongs to them lies in equal steps.
+    is_even: bool,
+}
+
+impl<'a> Written<'a> {
+    pub(super) fn of(herd: &Herd, nodes: &'a [(u32, u32)]) -> Written<'a> {
+        let (first, last) = (nodes.first().map_or(0, |(_, place)| *place), nodes.last().map_or(0, |(_, place)| *place));
+        let may_be = nodes.len() >= FEW && last.wrapping_sub(first) as usize + 1 == nodes.len() && herd.is_even_to(last);
+        let differ = || nodes.iter().zip(first..).fold(0, |differ, ((_, place), expected)| differ | (place ^ expected));
+        Written { nodes, is_even: may_be && differ() == 0 }
+    }
+}
+
+/// Puts those values of a strand into a packet that were written after a revision; None if they are not flat. `written` are
+/// those that may have been.
 pub(super) fn gather_flat(
     columns: &Columns,
     herds: &mut Herds,
     herd: usize,
     index: u16,
-    nodes: &[(u32, u32)],
+    written: Written<'_>,
     mark: Revision,
     draft: &mut Draft,
 ) -> Option<()> {
@@ -103,27 +124,96 @@ pub(super) fn gather_flat(
         mark: Revision,
         draft: &mut Draft,
     ) -> u64 {
-        let (column, mut added) = (T::column(columns), 0u64);
+        let (values, revisions, mut added) = (&T::column(columns).values[..], &T::column(columns).revisions[..], 0u64);
+        let (slots, shares) = (&strand.slots[..], &mut strand.shares[..]);
         draft.group(T::TYPE, FieldOf::Type(index), |bytes, runs| {
-            for (slot, place) in nodes {
-                let place = *place as usize;
-                let at = strand.slots[place] as usize;
-                if column.revisions[at] <= mark {
+            let is_old = |(_, place): &(u32, u32)| revisions[slots[*place as usize] as usize] <= mark;
+            for nodes in nodes.chunks(BLOCK) {
+                if nodes.iter().all(is_old) {
                     continue;
                 }
-                let floats = column.values[at].floats();
-                put_floats(bytes, floats);
-                runs.push(*slot);
-                let share = flat_share(numbers[place], index, floats);
-                added = added.wrapping_add(share).wrapping_sub(std::mem::replace(&mut strand.shares[place], share));
+                // Those that were written: their slots, their places, and where their values are.
+                let (mut written, mut count) = ([[0u32; BLOCK]; 3], 0);
+                for (slot, place) in nodes {
+                    let at = slots[*place as usize];
+                    written.iter_mut().zip([*slot, *place, at]).for_each(|(all, one)| all[count] = one);
+                    count += (revisions[at as usize] > mark) as usize;
+                }
+                let [slots, places, ats] = written.each_ref().map(|all| &all[..count]);
+                runs.extend(slots);
+                let start = bytes.len();
+                bytes.resize(start + 4 * COUNT * count, 0);
+                let into = bytes[start..].as_chunks_mut::<4>().0.as_chunks_mut::<COUNT>().0;
+                for (at, into) in ats.iter().zip(into) {
+                    *into = values[*at as usize].floats().map(f32::to_le_bytes);
+                }
+                for (place, bits) in places.iter().zip(bits_of::<COUNT>(&bytes[start..])) {
+                    let place = *place as usize;
+                    let share = flat_share(numbers[place], index, bits);
+                    added = added.wrapping_add(share).wrapping_sub(std::mem::replace(&mut shares[place], share));
+                }
             }
         });
         added
     }
+    let Written { nodes, is_even } = written;
     let strand = herds.herds[herd].strand_mut(index)?;
-    let added = for_flat!(strand.1.field_type, gather(columns, strand, index, nodes, mark, draft))?;
+    let evenly = match is_even {
+        true => for_flat!(strand.1.field_type, gather_even(columns, (strand.0, &mut *strand.1), index, nodes, mark, draft))?,
+        false => None,
+    };
+    let added = match evenly {
+        Some(added) => added,
+        None => for_flat!(strand.1.field_type, gather(columns, strand, index, nodes, mark, draft))?,
+    };
     herds.add(added);
     Some(())
+}
+
+/// The same where places follow each other and all lies in equal steps. None unless all was written, or nothing.
+fn gather_even<T: Flat<COUNT>, const COUNT: usize>(
+    columns: &Columns,
+    (numbers, strand): (&[u64], &mut Strand),
+    index: u16,
+    nodes: &[(u32, u32)],
+    mark: Revision,
+    draft: &mut Draft,
+) -> Option<u64> {
+    let (&[(first, place), (second, _), ..], column) = (nodes, T::column(columns)) else { return None };
+    let places = place as usize..place as usize + nodes.len();
+    let (at, step) = start_and_step(&strand.slots[places.clone()]);
+    let revisions = column.revisions[at..].iter().step_by(step).take(nodes.len());
+    match revisions.fold(0, |count, revision| count + (*revision > mark) as usize) {
+        0 => return Some(0),
+        count if count < nodes.len() => return None,
+        _ => {}
+    }
+    let mut added = 0u64;
+    draft.group(T::TYPE, FieldOf::Type(index), |bytes, runs| {
+        runs.push_run(Run { first, step: second - first, count: nodes.len() as u32 });
+        let start = bytes.len();
+        bytes.resize(start + 4 * COUNT * nodes.len(), 0);
+        let into = bytes[start..].as_chunks_mut::<4>().0.as_chunks_mut::<COUNT>().0;
+        for (value, into) in column.values[at..].iter().step_by(step).zip(into) {
+            *into = value.floats().map(f32::to_le_bytes);
+        }
+        added = share_evenly::<COUNT>(&numbers[places.clone()], index, &bytes[start..], &mut strand.shares[places]);
+    });
+    Some(added)
+}
+
+/// Sets what values add to the hash whose nodes' numbers are in equal steps; gives the difference.
+#[inline]
+fn share_evenly<const COUNT: usize>(numbers: &[u64], index: u16, bytes: &[u8], shares: &mut [u64]) -> u64 {
+    let first = numbers.first().copied().unwrap_or(0);
+    let step = numbers.get(1).map_or(0, |second| second.wrapping_sub(first));
+    let (mut added, mut number) = (0u64, first);
+    for (share, bits) in shares.iter_mut().zip(bits_of::<COUNT>(bytes)) {
+        let stands = flat_share(number, index, bits);
+        added = added.wrapping_add(stands).wrapping_sub(std::mem::replace(share, stands));
+        number = number.wrapping_add(step);
+    }
+    added
 }
 
 /// Writes a group of a packet to the nodes' fields; None if its values are not flat. The hash follows what stands there then.
@@ -200,27 +290,54 @@ impl<T> Target<'_, T> {
     where
         T: Flat<COUNT>,
     {
+        let even = rows.even.min(bytes.len() / (4 * COUNT));
+        if even >= FEW && rows.numbers[0] as u32 == first && rows.numbers[1] - rows.numbers[0] == step as u64 {
+            return (even, self.write_evenly(rows, index, &bytes[..4 * COUNT * even]));
+        }
         let (values, revisions) = (&mut self.column.values[..], &mut self.column.revisions[..]);
         let (revision, boundary) = (self.revision, self.boundary);
         let (mut done, mut added, mut slot) = (0, 0u64, first);
-        let places = rows.numbers.iter().zip(rows.nodes).zip(rows.slots).zip(&mut *rows.shares);
-        for ((((number, node), at), share), bytes) in places.zip(bytes.chunks_exact(4 * COUNT)) {
+        let places = rows.numbers.iter().zip(rows.slots).zip(&mut *rows.shares);
+        for (((number, at), share), bits) in places.zip(bits_of::<COUNT>(bytes)) {
             if *number as u32 != slot {
                 break;
             }
-            let value = &mut values[*at as usize];
-            *value = T::of_floats(floats_of(bytes));
-            // What stands there counts, not what was to be written.
-            let stands = flat_share(*number, index, value.floats());
+            // What stands there counts, which is what was to be written, to the bit.
+            values[*at as usize] = T::of_floats(bits.map(f32::from_bits));
+            let stands = flat_share(*number, index, bits);
             added = added.wrapping_add(stands).wrapping_sub(std::mem::replace(share, stands));
             revisions[*at as usize] = revision;
-            if std::mem::replace(&mut self.nodes[*node as usize], revision) <= boundary {
-                self.written.push(*node);
-            }
             done += 1;
             slot = slot.wrapping_add(step);
         }
+        for node in &rows.nodes[..done] {
+            if std::mem::replace(&mut self.nodes[*node as usize], revision) <= boundary {
+                self.written.push(*node);
+            }
+        }
         (done, added)
+    }
+
+    /// The same for values that are all in equal steps, one loop for each array, so that it has registers for all it needs.
+    fn write_evenly<const COUNT: usize>(&mut self, rows: &mut Rows<'_>, index: u16, bytes: &[u8]) -> u64
+    where
+        T: Flat<COUNT>,
+    {
+        let count = bytes.len() / (4 * COUNT);
+        let (at, step) = start_and_step(rows.slots);
+        for (value, bits) in self.column.values[at..].iter_mut().step_by(step).zip(bits_of::<COUNT>(bytes)) {
+            *value = T::of_floats(bits.map(f32::from_bits));
+        }
+        self.column.revisions[at..].iter_mut().step_by(step).take(count).for_each(|revision| *revision = self.revision);
+        let (node, step) = start_and_step(rows.nodes);
+        let boundary = self.boundary;
+        let logged = self.nodes[node..].iter().step_by(step).take(count).fold(true, |all, last| all & (*last > boundary));
+        if !logged {
+            let last = |node: &&u32| self.nodes[**node as usize] <= boundary;
+            self.written.extend(rows.nodes[..count].iter().filter(last));
+        }
+        self.nodes[node..].iter_mut().step_by(step).take(count).for_each(|last| *last = self.revision);
+        share_evenly::<COUNT>(rows.numbers, index, bytes, rows.shares)
     }
 }
 
@@ -268,6 +385,6 @@ mod tests {
         }
         let mut bytes = Vec::new();
         put_floats(&mut bytes, [1.0, -2.0, 3.5]);
-        assert_eq!(floats_of::<3>(&bytes), [1.0, -2.0, 3.5]);
+        assert_eq!(bits_of::<3>(&bytes).next(), Some([1.0f32, -2.0, 3.5].map(f32::to_bits)));
     }
 }

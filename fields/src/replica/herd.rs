@@ -36,6 +36,25 @@ pub(super) struct Herd {
     own: Vec<u64>,
     /// By the field's index in the application; none where replicas do not learn of it.
     pub(super) strands: Vec<Option<Strand>>,
+    /// So many nodes from the first place on have numbers, slots and values in equal steps, as nodes have that were made one after the other.
+    even: usize,
+}
+
+/// True if the last element of a list is as far from the one before as the second from the first.
+fn goes_on<T: Copy + Into<u64>>(list: &[T]) -> bool {
+    let ([first, second, ..], [.., before, last]) = (list, list) else { return true };
+    let [first, second, before, last]: [u64; 4] = [*first, *second, *before, *last].map(T::into);
+    second > first && last.wrapping_sub(before) == second - first
+}
+
+/// Where equal steps start, and how long they are.
+#[inline]
+pub(super) fn start_and_step(list: &[u32]) -> (usize, usize) {
+    match list {
+        [] => (0, 1),
+        [only] => (*only as usize, 1),
+        [first, second, ..] => (*first as usize, second.wrapping_sub(*first) as usize),
+    }
 }
 
 impl Herd {
@@ -43,7 +62,13 @@ impl Herd {
     pub(super) fn rows(&mut self, place: usize, index: u16) -> Option<Rows<'_>> {
         let Strand { field_type, slots, shares } = self.strands.get_mut(index as usize)?.as_mut()?;
         let (numbers, nodes) = (&self.numbers[place..], &self.nodes[place..]);
-        Some(Rows { field_type: *field_type, numbers, nodes, slots: &slots[place..], shares: &mut shares[place..] })
+        let even = self.even.saturating_sub(place);
+        Some(Rows { field_type: *field_type, numbers, nodes, slots: &slots[place..], shares: &mut shares[place..], even })
+    }
+
+    /// True if all places up to one are in equal steps.
+    pub(super) fn is_even_to(&self, place: u32) -> bool {
+        (place as usize) < self.even
     }
 
     /// A field of all nodes, with the nodes' numbers by their places.
@@ -60,6 +85,8 @@ pub(super) struct Rows<'a> {
     pub(super) nodes: &'a [u32],
     pub(super) slots: &'a [u32],
     pub(super) shares: &'a mut [u64],
+    /// So many of them are in equal steps.
+    pub(super) even: usize,
 }
 
 /// All of them.
@@ -93,7 +120,7 @@ impl Herds {
             strands.resize_with(strands.len().max(index as usize + 1), || None);
             strands[index as usize] = Some(Strand { field_type, slots: Vec::new(), shares: Vec::new() });
         }
-        self.herds.push(Herd { numbers: Vec::new(), nodes: Vec::new(), own: Vec::new(), strands });
+        self.herds.push(Herd { numbers: Vec::new(), nodes: Vec::new(), own: Vec::new(), strands, even: 0 });
         self.herds.len() as u32 - 1
     }
 
@@ -103,7 +130,7 @@ impl Herds {
         if self.seats.len() <= at {
             self.seats.resize(at + 1, Seat::default());
         }
-        let Herd { numbers, nodes, own, strands } = &mut self.herds[herd as usize];
+        let Herd { numbers, nodes, own, strands, even } = &mut self.herds[herd as usize];
         self.seats[at] = Seat { number, herd, place: numbers.len() as u32 };
         numbers.push(number);
         nodes.push(node);
@@ -113,12 +140,16 @@ impl Herds {
             strand.slots.push(slot(index as u16));
             strand.shares.push(0);
         }
+        let is_even = || goes_on(numbers) && goes_on(nodes) && strands.iter().flatten().all(|strand| goes_on(&strand.slots));
+        *even += (*even + 1 == numbers.len() && is_even()) as usize;
     }
 
     /// The fields of a node lie elsewhere now.
     pub(super) fn move_slots(&mut self, number: u64, slot: impl Fn(u16) -> u32) {
         let Some(seat) = self.seat(number) else { return };
-        for (index, strand) in self.herds[seat.herd as usize].strands.iter_mut().enumerate() {
+        let Herd { strands, even, .. } = &mut self.herds[seat.herd as usize];
+        *even = (*even).min(seat.place as usize);
+        for (index, strand) in strands.iter_mut().enumerate() {
             let Some(strand) = strand else { continue };
             strand.slots[seat.place as usize] = slot(index as u16);
         }
@@ -128,8 +159,9 @@ impl Herds {
     pub(super) fn remove(&mut self, number: u64) {
         let Some(Seat { herd, place, .. }) = self.seat(number) else { return };
         self.seats[number as u32 as usize] = Seat::default();
-        let Herd { numbers, nodes, own, strands } = &mut self.herds[herd as usize];
+        let Herd { numbers, nodes, own, strands, even } = &mut self.herds[herd as usize];
         let place = place as usize;
+        *even = (*even).min(place);
         numbers.swap_remove(place);
         nodes.swap_remove(place);
         let mut gone = own.swap_remove(place);

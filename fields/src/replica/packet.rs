@@ -14,7 +14,7 @@ use crate::FieldType;
 use crate::codec::{PlainField, field_type_named};
 
 const MAGIC: [u8; 4] = *b"UMBf";
-const VERSION: u16 = 2;
+const VERSION: u16 = 3;
 /// What is checked by the checksum begins after magic, version and checksum.
 const CHECKED: usize = 4 + 2 + 8;
 /// The length of the head follows, and then the values; the head comes last, since it tells of all of them.

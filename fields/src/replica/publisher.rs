@@ -6,7 +6,7 @@ use std::sync::Arc;
 use slotmap::Key;
 
 use super::bulk::{ImageHashes, LONG, Offered, hash_of_value, message_of_image, message_of_value};
-use super::flat::{gather_flat, put_flat, share_of_flat};
+use super::flat::{Written, gather_flat, put_flat, share_of_flat};
 use super::herd::Herds;
 use super::packet::{Draft, FieldOf, Place, TypeRecord};
 use super::routes::KnownRoutes;
@@ -182,8 +182,9 @@ impl Publisher {
         }
         let written = std::mem::take(&mut self.written);
         for (herd, nodes) in written.iter().enumerate().filter(|(_, nodes)| !nodes.is_empty()) {
+            let all = Written::of(&self.herds.herds[herd], nodes);
             for index in 0..self.herds.herds[herd].strands.len() as u16 {
-                if gather_flat(&graph.columns, &mut self.herds, herd, index, nodes, self.mark, draft).is_none() {
+                if gather_flat(&graph.columns, &mut self.herds, herd, index, all, self.mark, draft).is_none() {
                     self.others(graph, herd, index, nodes, draft);
                 }
             }

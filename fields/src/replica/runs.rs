@@ -34,12 +34,35 @@ impl RunWriter {
                 (run.step, run.count) = (step, 2);
                 return;
             }
-            if run.count > 1 && step as u64 == run.step as u64 * run.count as u64 {
+            if run.count > 1 && slot > run.first && step as u64 == run.step as u64 * run.count as u64 {
                 run.count += 1;
                 return;
             }
         }
         self.runs.push(Run { first: slot, step: 0, count: 1 });
+    }
+
+    /// A run that is known to be one.
+    pub(super) fn push_run(&mut self, run: Run) {
+        self.runs.push(run);
+    }
+
+    /// Many slots.
+    #[inline]
+    pub(super) fn extend(&mut self, slots: &[u32]) {
+        if let Some(run) = self.runs.last_mut().filter(|run| run.count > 1) {
+            let next = run.first.wrapping_add(run.step.wrapping_mul(run.count));
+            let expected = |place: usize| next.wrapping_add(run.step.wrapping_mul(place as u32));
+            let count = run.count as usize + slots.len();
+            let ends_within = run.first as u64 + run.step as u64 * (count as u64 - 1) <= u32::MAX as u64;
+            // One after the other, without a branch for each.
+            let differ = slots.iter().enumerate().fold(0, |differ, (place, slot)| differ | (slot ^ expected(place)));
+            if ends_within && differ == 0 {
+                run.count = count as u32;
+                return;
+            }
+        }
+        slots.iter().for_each(|slot| self.push(*slot));
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -92,6 +115,11 @@ mod tests {
         let mut writer = RunWriter::default();
         slots.iter().for_each(|slot| writer.push(*slot));
         assert_eq!(writer.runs.len(), runs, "{slots:?}");
+        for piece in [1, 2, 3, 64] {
+            let mut in_pieces = RunWriter::default();
+            slots.chunks(piece).for_each(|piece| in_pieces.extend(piece));
+            assert_eq!(in_pieces.runs, writer.runs, "{slots:?} by {piece}");
+        }
         let mut bytes = Vec::new();
         writer.write(&mut bytes);
         let read = Runs::read(&bytes).unwrap();
@@ -109,6 +137,7 @@ mod tests {
         check(&[5, 4, 3], 3);
         check(&[9, 9], 2);
         check(&[0, u32::MAX, 3], 2);
+        check(&[1 << 30, 2 << 30, 3 << 30, 0, 1 << 30], 2);
         check(&(0..1000).map(|place| place * 4_000_000).collect::<Vec<u32>>(), 1);
     }
 
