@@ -3,6 +3,7 @@
 use crate::cache::GpuMesh;
 use crate::clock::Clock;
 use crate::shaders;
+use crate::start::{Late, late};
 use bytemuck::{Pod, Zeroable};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -44,7 +45,7 @@ pub(crate) struct Deformed {
 
 /// Deforms the drawables that have a pose.
 pub(crate) struct Deformer {
-    pipeline: wgpu::ComputePipeline,
+    pipeline: Late<wgpu::ComputePipeline>,
     layout: wgpu::BindGroupLayout,
     /// By place of the drawable in the scene.
     deformed: HashMap<u32, Deformed>,
@@ -108,13 +109,16 @@ impl Deformer {
             bind_group_layouts: &[Some(&layout)],
             immediate_size: 0,
         });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("deform"),
-            layout: Some(&pipeline_layout),
-            module: &shaders::module(device, "deform", shaders::DEFORM),
-            entry_point: Some("deform"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
+        let device = device.clone();
+        let pipeline = late(move || {
+            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some("deform"),
+                layout: Some(&pipeline_layout),
+                module: &shaders::module(&device, "deform", shaders::DEFORM),
+                entry_point: Some("deform"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            })
         });
         Deformer { pipeline, layout, deformed: HashMap::new(), jobs: Vec::new(), revision: 0 }
     }

@@ -67,11 +67,17 @@ impl Renderer {
         let device = &gpu.device;
         let layouts = Layouts::new(device);
         let samples = Samples::default();
+        let (surface, screen, maps, volumes) = std::thread::scope(|scope| {
+            let surface = scope.spawn(|| Surface::new(device, &layouts, samples));
+            let screen = scope.spawn(|| Screen::new(device, &layouts, samples));
+            let (maps, volumes) = (Maps::new(device, &layouts), volume_pass(device, &layouts, samples));
+            (joined(surface), joined(screen), maps, volumes)
+        });
         Ok(Renderer {
-            surface: Surface::new(device, &layouts, samples),
-            screen: Screen::new(device, &layouts, samples),
-            maps: Maps::new(device, &layouts),
-            volumes: volume_pass(device, &layouts, samples),
+            surface,
+            screen,
+            maps,
+            volumes,
             soft: SoftPass::new(device, &layouts, samples),
             contours: Contours::new(device, &layouts, samples),
             deformer: Deformer::new(device),
@@ -280,17 +286,18 @@ impl Renderer {
                 passes.extend(view.steps.iter().map(|s| (view.add_pass(s.soft.is_some()), &*view.opaque)));
             }
             for (_, draw) in &view.contoured {
-                self.surface.make(device, Pass::Mark, self.draws.batches()[draw.batch as usize].kind);
+                self.surface.want(Pass::Mark, self.draws.batches()[draw.batch as usize].kind);
             }
             for (pass, list) in passes {
                 let mut last = None;
                 for kind in list.iter().map(|draw| self.draws.batches()[draw.batch as usize].kind) {
                     if last.replace(kind) != Some(kind) {
-                        self.surface.make(device, pass, kind);
+                        self.surface.want(pass, kind);
                     }
                 }
             }
         }
+        self.surface.make_wanted(device);
         let mut rest = plans.iter();
         for sheet in &sheets.0 {
             let is_soft = rest.by_ref().take(sheet.views).flat_map(|view: &ViewPlan| &view.steps).any(|s| s.soft.is_some());
@@ -464,6 +471,10 @@ impl Renderer {
         }
         self.problems.drain()
     }
+}
+
+fn joined<T>(thread: std::thread::ScopedJoinHandle<'_, T>) -> T {
+    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
 fn volume_pass(device: &wgpu::Device, layouts: &Layouts, samples: Samples) -> VolumePass {

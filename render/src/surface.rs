@@ -6,6 +6,7 @@ use crate::draws::{Alpha, Kind, Needs};
 use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT};
 use crate::layouts::Layouts;
 use crate::lights::Lights;
+use crate::start::at_once;
 use crate::{shaders, uniforms};
 use std::collections::HashMap;
 use umbriel_scene::{FogKind, Material, Samples, Scene};
@@ -119,8 +120,13 @@ pub(crate) struct Surface {
     authors: Authors,
     samples: Samples,
     frame: FrameNeeds,
-    pipelines: HashMap<(Pass, Kind, (FrameNeeds, u8)), wgpu::RenderPipeline>,
+    pipelines: HashMap<Key, wgpu::RenderPipeline>,
+    /// What is needed and not made yet.
+    wanted: Vec<Key>,
 }
+
+/// What a pipeline is made for.
+type Key = (Pass, Kind, (FrameNeeds, u8));
 
 impl Surface {
     pub(crate) fn new(device: &wgpu::Device, layouts: &Layouts, samples: Samples) -> Surface {
@@ -141,6 +147,7 @@ impl Surface {
             samples,
             frame: FrameNeeds::default(),
             pipelines: HashMap::new(),
+            wanted: Vec::new(),
         }
     }
 
@@ -155,20 +162,33 @@ impl Surface {
         self.frame = frame;
     }
 
-    /// Makes the pipeline where there is none yet.
-    pub(crate) fn make(&mut self, device: &wgpu::Device, pass: Pass, kind: Kind) {
+    fn key(&self, pass: Pass, kind: Kind) -> Key {
         let kind = pass.seen(kind);
-        let module = self.authors.get(kind.shader).map_or(&self.module, |author| &author.module);
-        let is_soft = matches!(pass, Pass::AddSoft | Pass::VisibilitySoft);
-        let layout = if is_soft { &self.soft_layout } else { &self.layout };
-        let needs = self.frame.of(pass, kind);
-        let make = || pipeline(device, (module, layout), pass, (kind, needs), self.samples);
-        self.pipelines.entry((pass, kind, needs)).or_insert_with(make);
+        (pass, kind, self.frame.of(pass, kind))
+    }
+
+    /// A pipeline is needed: [`Surface::make_wanted`] makes it where there is none yet.
+    pub(crate) fn want(&mut self, pass: Pass, kind: Kind) {
+        let key = self.key(pass, kind);
+        if !self.pipelines.contains_key(&key) && !self.wanted.contains(&key) {
+            self.wanted.push(key);
+        }
+    }
+
+    /// Makes all pipelines that are needed, at the same time: each takes a driver tens of milliseconds.
+    pub(crate) fn make_wanted(&mut self, device: &wgpu::Device) {
+        let wanted = std::mem::take(&mut self.wanted);
+        let made = at_once(&wanted, |(pass, kind, needs)| {
+            let module = self.authors.get(kind.shader).map_or(&self.module, |author| &author.module);
+            let is_soft = matches!(pass, Pass::AddSoft | Pass::VisibilitySoft);
+            let layout = if is_soft { &self.soft_layout } else { &self.layout };
+            pipeline(device, (module, layout), *pass, (*kind, *needs), self.samples)
+        });
+        self.pipelines.extend(wanted.into_iter().zip(made));
     }
 
     pub(crate) fn get(&self, pass: Pass, kind: Kind) -> Option<&wgpu::RenderPipeline> {
-        let kind = pass.seen(kind);
-        self.pipelines.get(&(pass, kind, self.frame.of(pass, kind)))
+        self.pipelines.get(&self.key(pass, kind))
     }
 
     /// Number of the shader that a material is drawn with, and of the one that its author wrote, which may be wrong.

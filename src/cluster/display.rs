@@ -8,7 +8,7 @@ use crate::cli;
 use crate::window::screenshot;
 use std::io::Write;
 use std::time::{Duration, Instant};
-use umbriel_displays::cluster::{ClusterError, Event, Follower, FollowerOptions, Pointing, Screen};
+use umbriel_displays::cluster::{ClusterError, Event, Follower, FollowerOptions, Pointing, Progress, Screen};
 use umbriel_displays::navigation::Input;
 use umbriel_displays::rig::Aim;
 use umbriel_displays::window::{self, App, Command, Options, Stage};
@@ -22,13 +22,14 @@ const TURN: Duration = Duration::from_millis(4);
 
 /// Follows an application until it ends, until the window is closed or Ctrl-C, or for ever.
 pub(crate) fn display(args: &cli::Display) -> Result<usize, Failure> {
+    // What draws is made while the application is looked for.
+    let canvas = args.headless.then(|| Canvas::new(&args.show, args.out.as_deref()));
     let mut process = Process::start(args)?;
-    let ended = if args.headless {
-        let mut canvas = Canvas::new(&args.show, args.out.as_deref())?;
+    let ended = if let Some(mut canvas) = canvas {
         // What is corrupted shows in a frame that comes after it.
         let patience = Duration::from_millis(if args.corrupt.is_some() { 1 } else { 50 });
         loop {
-            match process.turn(&mut canvas, patience) {
+            match canvas.settle().map_err(Failure::from).and_then(|()| process.turn(&mut canvas, patience)) {
                 Ok(true) => {}
                 other => break other.map(drop),
             }
@@ -53,12 +54,15 @@ struct Process<'a> {
     started: Instant,
     /// Silence was told of.
     is_told: bool,
+    /// How long the start took was told of.
+    is_up: bool,
     /// The frame after which the replica is still to be corrupted.
     corrupt_after: Option<u64>,
 }
 
 impl Process<'_> {
     fn start(args: &cli::Display) -> Result<Process<'_>, Failure> {
+        let started = Instant::now();
         let types: Vec<NodeType> = umbriel_scenegraph::node_types().into_iter().chain(builtin_types()).collect();
         let options = FollowerOptions {
             endpoint: args.connect.clone(),
@@ -71,8 +75,9 @@ impl Process<'_> {
             args,
             follower: Follower::connect(options, &args.show, TypeRegistry::from(types))?,
             interrupt: Interrupt::watch()?,
-            started: Instant::now(),
+            started,
             is_told: false,
+            is_up: false,
             corrupt_after: args.corrupt,
         })
     }
@@ -87,6 +92,10 @@ impl Process<'_> {
         if self.args.once && is_alone && self.started.elapsed() > Duration::from_secs(PATIENCE_S) {
             let has_certificates = self.args.link.certificates.is_some();
             return Err(ClusterError::silent(&self.args.connect, PATIENCE_S, has_certificates).into());
+        }
+        if !self.is_up && self.follower.progress().shown.is_some() {
+            self.is_up = true;
+            tracing::info!("{}", start_of(&self.args.show, self.started, self.follower.progress()));
         }
         if self.corrupt_after.is_some_and(|frame| corrupt(&mut self.follower, frame)) {
             self.corrupt_after = None;
@@ -146,6 +155,19 @@ impl App for Windowed<'_> {
     fn screenshot(&mut self, name: &str, pixels: &RgbaPixels) {
         screenshot("display", name, pixels);
     }
+}
+
+/// Where the time went until the first picture was shown, in a line.
+fn start_of(show: &str, started: Instant, progress: &Progress) -> String {
+    let ms = |when: Option<Instant>| when.map_or(0, |when| when.saturating_duration_since(started).as_millis());
+    format!(
+        "display `{show}` is up after {} ms: application found after {} ms, its world here after {}, first drawing from {} to {}",
+        ms(progress.shown),
+        ms(progress.found),
+        ms(progress.world),
+        ms(progress.draws),
+        ms(progress.drawn)
+    )
 }
 
 fn summary(follower: &Follower) -> String {

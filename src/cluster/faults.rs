@@ -131,7 +131,9 @@ impl Plan {
         }
         let is_over = |open: &mut Open| {
             let is_live = live.contains(&open.fault.display);
-            let is_back = open.is_healed && is_live && (open.was_out || open.heals.elapsed() > LASTS);
+            // Who was killed is out for certain, once the application has noticed: until then it is the old process that is live.
+            let was_out = open.was_out || open.fault.kind != FaultKind::Kill && open.heals.elapsed() > LASTS;
+            let is_back = open.is_healed && is_live && was_out;
             is_back || Instant::now() > open.heals + PATIENCE
         };
         for open in self.open.extract_if(.., is_over) {
@@ -201,7 +203,7 @@ fn begin(
     }
     tracing::info!("{:?} of `{}` at frame {}", fault.kind, fault.display, fault.frame);
     Ok(Open {
-        was_out: fault.kind == FaultKind::Kill,
+        was_out: false,
         fault,
         seed,
         heals,

@@ -1,6 +1,5 @@
 //! Draws one display, or one channel of it, out of a replica: to files or in a window.
 
-use super::Failure;
 use crate::headless::{DESKTOP_SIZE, describe};
 use crate::png;
 use crate::session::bounds;
@@ -10,7 +9,7 @@ use umbriel_displays::cluster::{ClusterError, Screen};
 use umbriel_displays::rig::{Aim, DESKTOP, Pointed, Pointers, Rig, Wanted};
 use umbriel_displays::window::Stage;
 use umbriel_fields::Graph;
-use umbriel_render::{Gpu, Renderer, RgbaPixels};
+use umbriel_render::{Renderer, RgbaPixels, Starting};
 use umbriel_scene::{Aabb, Picture, Scene};
 use umbriel_scenegraph::Extractor;
 
@@ -160,21 +159,30 @@ fn channel_in(picture: &Picture, place: usize) -> Result<Picture, ScreenError> {
 pub(super) struct Canvas {
     sight: Sight,
     out: Option<PathBuf>,
-    device: String,
-    renderer: Renderer,
+    /// As long as the device is being looked for.
+    starting: Option<Starting>,
+    /// The name of the device, and what draws on it.
+    drawing: Option<(String, Renderer)>,
     drawn: Vec<RgbaPixels>,
 }
 
 impl Canvas {
-    pub(super) fn new(show: &str, out: Option<&Path>) -> Result<Canvas, Failure> {
-        let gpu = Gpu::new(None)?;
-        Ok(Canvas {
-            sight: Sight::new(show),
-            out: out.map(Path::to_path_buf),
-            device: describe(&gpu),
-            renderer: Renderer::new(&gpu)?,
-            drawn: Vec::new(),
-        })
+    pub(super) fn new(show: &str, out: Option<&Path>) -> Canvas {
+        let out = out.map(Path::to_path_buf);
+        Canvas { sight: Sight::new(show), out, starting: Some(Starting::begin()), drawing: None, drawn: Vec::new() }
+    }
+
+    /// Says what is wrong with the device as soon as it is known.
+    pub(super) fn settle(&mut self) -> Result<(), umbriel_render::Error> {
+        if self.starting.as_ref().is_some_and(Starting::is_done) { self.finish() } else { Ok(()) }
+    }
+
+    fn finish(&mut self) -> Result<(), umbriel_render::Error> {
+        if let Some(starting) = self.starting.take() {
+            let (gpu, renderer) = starting.finish()?;
+            self.drawing = Some((describe(&gpu), renderer));
+        }
+        Ok(())
     }
 }
 
@@ -183,18 +191,20 @@ impl Screen for Canvas {
 
     fn draw(&mut self, graph: &Graph, _frame: u64, is_new: bool) -> Result<(), ScreenError> {
         let seen = self.sight.look(graph, is_new, &WindowSizes::new())?;
-        self.renderer.render_part(&self.sight.scene, &seen.pictures, &seen.all)?;
-        for problem in self.renderer.problems() {
+        self.finish()?;
+        let Some((_, renderer)) = &mut self.drawing else { return Ok(()) };
+        renderer.render_part(&self.sight.scene, &seen.pictures, &seen.all)?;
+        for problem in renderer.problems() {
             tracing::error!("{problem}");
         }
         // Reading back waits for the GPU: ready means that the picture is there.
-        self.drawn = self.renderer.read_back(0)?;
+        self.drawn = renderer.read_back(0)?;
         Ok(())
     }
 
     fn show(&mut self, frame: u64) -> Result<(), ScreenError> {
-        if let Some(out) = &self.out {
-            png::write(&file_of(out, frame), &png::row(&self.drawn), &self.device)?;
+        if let (Some(out), Some((device, _))) = (&self.out, &self.drawing) {
+            png::write(&file_of(out, frame), &png::row(&self.drawn), device)?;
         }
         Ok(())
     }

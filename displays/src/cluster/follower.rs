@@ -56,6 +56,25 @@ pub struct FollowerReport {
     pub longest_gap_ms: f64,
 }
 
+/// When a display came how far for the first time.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Progress {
+    /// An application answers.
+    pub found: Option<Instant>,
+    /// Its world is here.
+    pub world: Option<Instant>,
+    /// Something is being drawn.
+    pub draws: Option<Instant>,
+    /// It is drawn.
+    pub drawn: Option<Instant>,
+    /// A frame was shown.
+    pub shown: Option<Instant>,
+}
+
+fn note(when: &mut Option<Instant>) {
+    when.get_or_insert_with(Instant::now);
+}
+
 enum Arrived {
     Frame(Vec<u8>),
     Release(Vec<u8>),
@@ -100,6 +119,7 @@ pub struct Follower {
     /// Of the replica as it was drawn last; by now it may be further.
     drawn_hash: u64,
     drawn_frame: u64,
+    progress: Progress,
     report: FollowerReport,
 }
 
@@ -155,6 +175,7 @@ impl Follower {
             took: Duration::ZERO,
             drawn_hash: 0,
             drawn_frame: 0,
+            progress: Progress::default(),
             report: FollowerReport::default(),
         })
     }
@@ -162,6 +183,11 @@ impl Follower {
     /// What happened so far.
     pub fn report(&self) -> &FollowerReport {
         &self.report
+    }
+
+    /// How far it came, and when.
+    pub fn progress(&self) -> &Progress {
+        &self.progress
     }
 
     /// True once the application said that it ends.
@@ -302,7 +328,9 @@ impl Follower {
             }
             Arrived::Application(true) => {
                 self.alone_since = None;
+                note(&mut self.progress.found);
                 self.line.begin();
+                self.step(DisplayEvent::Linked, screen)?;
             }
             Arrived::Application(false) if self.is_over => {}
             Arrived::Application(false) => {
@@ -350,12 +378,14 @@ impl Follower {
                     DisplayAction::Apply(frame) => events.push_back(self.apply(frame)?),
                     DisplayAction::Draw(frame) => {
                         let began = Instant::now();
+                        note(&mut self.progress.draws);
                         if let Some(replica) = &mut self.replica {
                             self.drawn_hash = replica.hash_now();
                             self.drawn_frame = frame;
                             screen.draw(replica.graph(), frame, std::mem::take(&mut self.is_new))?;
                         }
                         self.took = began.elapsed();
+                        note(&mut self.progress.drawn);
                         tracing::debug!("display `{}` drew frame {frame} in {:.1?}", self.name, self.took);
                         events.push_back(DisplayEvent::Drawn(frame));
                     }
@@ -387,6 +417,7 @@ impl Follower {
             self.report.longest_gap_ms = self.report.longest_gap_ms.max(gap_ms);
         }
         self.report.shown += 1;
+        note(&mut self.progress.shown);
     }
 
     /// Makes the replica anew. Where the old one was doubted, what differs is told.
@@ -409,6 +440,7 @@ impl Follower {
             tracing::error!("the snapshot of frame {} is not what its hash says", fresh.frame());
         }
         self.report.snapshots += 1;
+        note(&mut self.progress.world);
         self.replica = Some(fresh);
         self.is_new = true;
         Ok(())

@@ -174,7 +174,7 @@ impl Gate {
 
     /// A display that cannot draw this frame is not waited for; it comes back as any other.
     pub(super) fn excuse(&mut self, number: u64) {
-        self.step(ApplicationEvent::Gone(DisplayId(number)));
+        self.step(ApplicationEvent::Excused(DisplayId(number)));
     }
 
     /// Another display of this name.
@@ -227,6 +227,15 @@ impl Gate {
                     let name = self.names.get(&id.0).cloned().unwrap_or_else(|| "?".into());
                     tracing::warn!("display `{name}` was late for frame {frame}: the others go on without it");
                     self.report.dropped += 1;
+                }
+                ApplicationAction::TooSlow { display, times, within_us, took_us } => {
+                    let name = self.names.get(&display.0).map_or("?", String::as_str);
+                    let (within_s, took_ms) = (within_us as f64 / 1e6, took_us / 1000);
+                    tracing::warn!(
+                        "display `{name}` was late {times} times in {within_s:.1} s: it needs {took_ms} ms for a frame, and {} ms are \
+                         waited; from now on it is waited for less and less often, and shows what it draws in time",
+                        self.lock.timeout_us() / 1000
+                    );
                 }
             }
         }

@@ -48,7 +48,7 @@ mod waits;
 pub use self::{
     certificates::make as make_certificates,
     event::{Event, Input, Motion, Pointing},
-    follower::{Follower, FollowerOptions, FollowerReport, Screen},
+    follower::{Follower, FollowerOptions, FollowerReport, Progress, Screen},
     gate::HostReport,
     host::{Host, HostOptions},
     proxy::Proxy,

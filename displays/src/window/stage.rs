@@ -4,7 +4,7 @@ use super::WindowSizes;
 use super::pane::Pane;
 use crate::Error;
 use std::collections::BTreeSet;
-use umbriel_render::{FrameStats, Gpu, Renderer};
+use umbriel_render::{FrameStats, Gpu, Renderer, Starting};
 use umbriel_scene::{Picture, Scene};
 use winit::event_loop::ActiveEventLoop;
 
@@ -13,6 +13,8 @@ pub(super) struct Panes {
     pub(super) open: Vec<Pane>,
     /// None until the first window is open.
     pub(super) drawing: Option<(Gpu, Renderer)>,
+    /// Made before there is a window, as long as nobody knows what it shows.
+    starting: Option<Starting>,
     /// Of the frame that was drawn last.
     pub(super) pictures: Vec<Picture>,
     /// How often a frame was shown.
@@ -25,7 +27,8 @@ pub(super) struct Panes {
 
 impl Panes {
     pub(super) fn new(fullscreen: Option<usize>) -> Panes {
-        Panes { open: Vec::new(), drawing: None, pictures: Vec::new(), shown: 0, fullscreen, closed: BTreeSet::new() }
+        let starting = Some(Starting::begin());
+        Panes { open: Vec::new(), drawing: None, starting, pictures: Vec::new(), shown: 0, fullscreen, closed: BTreeSet::new() }
     }
 
     /// Closes a window for good. True if it was the last one.
@@ -48,11 +51,8 @@ impl Panes {
             let surface = match &self.drawing {
                 Some((gpu, _)) => pane.make_surface(&gpu.instance)?,
                 None => {
-                    let instance = Gpu::instance();
-                    let surface = pane.make_surface(&instance)?;
-                    let gpu = Gpu::new(Some((instance, &surface)))?;
-                    let renderer = Renderer::new(&gpu)?;
-                    self.drawing = Some((gpu, renderer));
+                    let (drawing, surface) = first(&pane, self.starting.take())?;
+                    self.drawing = Some(drawing);
                     surface
                 }
             };
@@ -63,6 +63,21 @@ impl Panes {
         }
         Ok(())
     }
+}
+
+/// The device for the first window, and the window's surface: the one that was begun, unless it cannot draw into windows.
+fn first(pane: &Pane, starting: Option<Starting>) -> Result<((Gpu, Renderer), wgpu::Surface<'static>), Error> {
+    if let Some(Ok((gpu, renderer))) = starting.map(Starting::finish) {
+        let surface = pane.make_surface(&gpu.instance)?;
+        if gpu.adapter.is_surface_supported(&surface) {
+            return Ok(((gpu, renderer), surface));
+        }
+    }
+    let instance = Gpu::instance();
+    let surface = pane.make_surface(&instance)?;
+    let gpu = Gpu::new(Some((instance, &surface)))?;
+    let renderer = Renderer::new(&gpu)?;
+    Ok(((gpu, renderer), surface))
 }
 
 /// Where an [`App`](super::App) draws and shows its pictures, a window each.

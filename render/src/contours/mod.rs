@@ -12,6 +12,7 @@ use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT};
 use crate::layouts::Layouts;
 use crate::shaders;
 use crate::slots::Slots;
+use crate::start::{Late, late};
 use crate::volumes::VolumePass;
 use bytemuck::{Pod, Zeroable};
 use glam::Mat4;
@@ -46,9 +47,8 @@ struct Inked {
 pub(crate) struct Contours {
     layout: wgpu::BindGroupLayout,
     uniform_layout: wgpu::BindGroupLayout,
-    /// Everywhere, and where the stencil is another number.
-    lines: wgpu::RenderPipeline,
-    outlines: wgpu::RenderPipeline,
+    /// Lines everywhere, and outlines where the stencil is another number.
+    pipelines: Late<[wgpu::RenderPipeline; 2]>,
     uniforms: Slots<Uniform>,
     /// By place in the scene's drawables.
     shapes: BTreeMap<usize, Inked>,
@@ -74,16 +74,13 @@ impl Contours {
             bind_group_layouts: &[Some(&layouts.view), Some(&layout), Some(&uniform_layout)],
             immediate_size: 0,
         });
-        let module = shaders::module(device, "contours", shaders::CONTOURS);
-        let pipeline = |entry, compare| pipeline(device, (&module, &pipeline_layout), entry, compare, samples);
-        Contours {
-            lines: pipeline("line", CompareFunction::Always),
-            outlines: pipeline("outline", CompareFunction::NotEqual),
-            uniforms: Slots::new(device, "contours"),
-            shapes: BTreeMap::new(),
-            layout,
-            uniform_layout,
-        }
+        let of = device.clone();
+        let pipelines = late(move || {
+            let module = shaders::module(&of, "contours", shaders::CONTOURS);
+            [("line", CompareFunction::Always), ("outline", CompareFunction::NotEqual)]
+                .map(|(entry, compare)| pipeline(&of, (&module, &pipeline_layout), entry, compare, samples))
+        });
+        Contours { pipelines, uniforms: Slots::new(device, "contours"), shapes: BTreeMap::new(), layout, uniform_layout }
     }
 
     /// Takes the shapes of a frame.
@@ -168,11 +165,10 @@ impl Contours {
                 mark(pass, draw);
             }
             pass.set_bind_group(0, view, &[]);
-            let lines = (&self.lines, shape.style.line_px, 6);
-            let outlines = (&self.outlines, shape.style.outline_px, 12);
-            for (pipeline, width, corners) in [lines, outlines] {
+            let widths = [(shape.style.line_px, 6), (shape.style.outline_px, 12)];
+            for (place, (width, corners)) in widths.into_iter().enumerate() {
                 if width > 0.0 {
-                    pass.set_pipeline(pipeline);
+                    pass.set_pipeline(&self.pipelines[place]);
                     pass.set_bind_group(2, self.uniforms.group(shape.slot), &[]);
                     for (edges, group) in &shape.parts {
                         pass.set_bind_group(1, group, &[]);

@@ -5,10 +5,11 @@ use crate::clock::Clock;
 use crate::gpu::LINEAR_FORMAT;
 use crate::layouts::Layouts;
 use crate::shaders;
+use crate::start::{Late, late};
 use umbriel_scene::Samples;
 use wgpu::{BindingResource, BindingType, BlendComponent, BlendFactor, BlendOperation, ShaderStages, TextureSampleType};
 
-/// Pipelines, in the order in which they run.
+/// Pipelines, in the order in which they run, each made when it is first needed.
 pub(crate) struct Passes {
     stencil_layout: wgpu::BindGroupLayout,
     wedge_layout: wgpu::BindGroupLayout,
@@ -16,10 +17,10 @@ pub(crate) struct Passes {
     depth_layout: wgpu::BindGroupLayout,
     pub(super) source_layout: wgpu::BindGroupLayout,
     soft_view: wgpu::BindGroupLayout,
-    hard: wgpu::RenderPipeline,
-    wedges: wgpu::RenderPipeline,
-    penumbra: wgpu::RenderPipeline,
-    film: wgpu::RenderPipeline,
+    hard: Late<wgpu::RenderPipeline>,
+    wedges: Late<wgpu::RenderPipeline>,
+    penumbra: Late<wgpu::RenderPipeline>,
+    film: Late<wgpu::RenderPipeline>,
 }
 
 const EMPTY: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
@@ -198,17 +199,22 @@ impl Stage {
         Stage { vertex, fragment, source: source.to_owned(), target, samples: 1, cull_mode: None, blend: None }
     }
 
-    fn pipeline(&self, device: &wgpu::Device, groups: &[Option<&wgpu::BindGroupLayout>]) -> wgpu::RenderPipeline {
+    fn pipeline(self, device: &wgpu::Device, groups: &[Option<&wgpu::BindGroupLayout>]) -> Late<wgpu::RenderPipeline> {
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(self.fragment),
             bind_group_layouts: groups,
             immediate_size: 0,
         });
+        let device = device.clone();
+        late(move || self.make(&device, &layout))
+    }
+
+    fn make(&self, device: &wgpu::Device, layout: &wgpu::PipelineLayout) -> wgpu::RenderPipeline {
         let module = shaders::module(device, self.fragment, &[&self.source]);
         let target = wgpu::ColorTargetState { format: self.target, blend: self.blend, write_mask: wgpu::ColorWrites::ALL };
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.fragment),
-            layout: Some(&layout),
+            layout: Some(layout),
             vertex: wgpu::VertexState {
                 module: &module,
                 entry_point: Some(self.vertex),

@@ -1,6 +1,7 @@
 //! The silhouettes of a job's casters in one list, gathered by compute passes.
 
 use crate::shaders;
+use crate::start::{Late, late};
 use crate::volumes::{CasterUniform, GpuPart, VolumeCaster, VolumeLight, VolumePass};
 use std::sync::Arc;
 use wgpu::BufferUsages;
@@ -39,7 +40,7 @@ impl PartialEq for Item {
 /// The pipeline.
 pub(super) struct Gather {
     layout: wgpu::BindGroupLayout,
-    pipeline: wgpu::ComputePipeline,
+    pipeline: Late<wgpu::ComputePipeline>,
 }
 
 impl Gather {
@@ -63,13 +64,16 @@ impl Gather {
             bind_group_layouts: &[Some(&layout)],
             immediate_size: 0,
         });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("silhouettes"),
-            layout: Some(&pipeline_layout),
-            module: &shaders::module(device, "silhouettes", shaders::SILHOUETTES),
-            entry_point: Some("gather"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
+        let device = device.clone();
+        let pipeline = late(move || {
+            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some("silhouettes"),
+                layout: Some(&pipeline_layout),
+                module: &shaders::module(&device, "silhouettes", shaders::SILHOUETTES),
+                entry_point: Some("gather"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            })
         });
         Gather { layout, pipeline }
     }

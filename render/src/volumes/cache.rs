@@ -30,8 +30,8 @@ pub(crate) struct GpuPart {
 /// Parts of all meshes that were ever asked for and still live.
 #[derive(Default)]
 pub(super) struct MeshCache {
-    // The weak pointer keeps the address from being used again.
-    meshes: HashMap<*const Mesh, (Weak<Mesh>, Vec<Arc<GpuPart>>)>,
+    /// By address, which the weak reference keeps from being used again.
+    meshes: HashMap<usize, (Weak<Mesh>, Vec<Arc<GpuPart>>)>,
     /// What was found wrong with meshes and not yet told.
     pub(super) problems: Vec<String>,
 }
@@ -49,7 +49,7 @@ impl MeshCache {
             let parts = if parts.iter().all(|p| fit(&p)) { parts } else { Vec::new() };
             (Arc::downgrade(mesh), parts.iter().map(|p| Arc::new(GpuPart::new(device, p))).collect())
         };
-        &self.meshes.entry(Arc::as_ptr(mesh)).or_insert_with(upload).1
+        &self.meshes.entry(Arc::as_ptr(mesh) as usize).or_insert_with(upload).1
     }
 
     /// Forgets meshes that nobody holds any more.

@@ -6,9 +6,15 @@ use super::{DisplayId, TimeUs};
 
 /// How long a display that kept the others waiting is not waited for again: doubles each time.
 const FIRST_REST_US: TimeUs = 100_000;
+/// The longest where it stood still or was cut off.
 const LONGEST_REST_US: TimeUs = 400_000;
-/// Frames in a row after which earlier failures are forgotten.
+/// The longest where it draws too slowly for the others. What it draws in time it shows all the same.
+const LONGEST_REST_OF_SLOW_US: TimeUs = 12_800_000;
+/// Frames in a row, and times the rest, after which earlier failures are forgotten.
 const GOOD_FRAMES: u32 = 60;
+const GOOD_RESTS: u64 = 4;
+/// Failures after which the operator is told that a display is too slow.
+const TELLING: u32 = 4;
 /// A display that was not heard of for so long is forgotten.
 const FORGOTTEN_US: TimeUs = 10_000_000;
 
@@ -28,6 +34,8 @@ pub enum ApplicationEvent {
     },
     /// A display left, or its connection broke.
     Gone(DisplayId),
+    /// A display cannot draw what is published, and nobody shall wait for it.
+    Excused(DisplayId),
     /// Time went on; at least every few milliseconds while a frame waits.
     Tick,
 }
@@ -41,6 +49,17 @@ pub enum ApplicationAction {
     Admitted(DisplayId),
     /// Nobody waits for this display any more; it was late for this frame.
     Dropped(DisplayId, u64),
+    /// A display is late again and again, because it draws too slowly. Told once, until it was in time for long.
+    TooSlow {
+        /// The display.
+        display: DisplayId,
+        /// How often it was late.
+        times: u32,
+        /// In how long.
+        within_us: TimeUs,
+        /// How long it drew last.
+        took_us: TimeUs,
+    },
 }
 
 #[derive(Clone, Debug)]
@@ -56,6 +75,16 @@ struct Member {
     rests_until_us: TimeUs,
     rest_us: TimeUs,
     good_frames: u32,
+    /// Since when others wait for it.
+    live_since_us: TimeUs,
+    /// How often it was late since it was in time for long, and since when.
+    failures: u32,
+    failing_since_us: TimeUs,
+    /// It was left behind, and has not drawn anything since.
+    is_late: bool,
+    /// What it was late with took it too long to draw.
+    is_slow: bool,
+    is_told: bool,
 }
 
 impl Member {
@@ -66,6 +95,34 @@ impl Member {
 
     fn may_come_in(&self, now_us: TimeUs) -> bool {
         !self.is_live && now_us >= self.rests_until_us
+    }
+
+    fn comes_in(&mut self, now_us: TimeUs) {
+        (self.is_live, self.live_since_us) = (true, now_us);
+    }
+
+    fn fails(&mut self, now_us: TimeUs) {
+        if self.failures == 0 {
+            self.failing_since_us = now_us;
+        }
+        self.failures += 1;
+        (self.is_live, self.is_late, self.good_frames) = (false, true, 0);
+        self.rest_us = self.rest_us.min(self.longest_rest_us());
+        self.rests_until_us = now_us + self.rest_us;
+        self.rest_us = self.longest_rest_us().min(2 * self.rest_us);
+    }
+
+    fn longest_rest_us(&self) -> TimeUs {
+        if self.is_slow { LONGEST_REST_OF_SLOW_US } else { LONGEST_REST_US }
+    }
+
+    /// Was in time once more.
+    fn succeeds(&mut self, now_us: TimeUs) {
+        self.good_frames += 1;
+        if self.good_frames >= GOOD_FRAMES && now_us >= self.live_since_us + GOOD_RESTS * self.rest_us {
+            (self.rest_us, self.failures) = (FIRST_REST_US, 0);
+            (self.is_slow, self.is_told) = (false, false);
+        }
     }
 }
 
@@ -88,6 +145,11 @@ impl ApplicationLock {
     /// True while a frame waits for displays.
     pub fn waits(&self) -> bool {
         self.released < self.frame
+    }
+
+    /// How long a frame waits.
+    pub fn timeout_us(&self) -> TimeUs {
+        self.timeout_us
     }
 
     /// The last frame that was published.
@@ -117,13 +179,14 @@ impl ApplicationLock {
                     let had_last = member.ready + 1 == frame && member.took_us < self.timeout_us;
                     let is_in_step = had_last || member.is_fast(self.timeout_us);
                     if member.may_come_in(now_us) && member.ready_us >= before_us && is_in_step {
-                        member.is_live = true;
+                        member.comes_in(now_us);
                         actions.push(ApplicationAction::Admitted(*id));
                     }
                 }
             }
             ApplicationEvent::Ready { display, frame, took_us } => self.ready(now_us, display, frame, took_us, &mut actions),
             ApplicationEvent::Gone(id) => drop(self.members.remove(&id)),
+            ApplicationEvent::Excused(id) => self.members.get_mut(&id).into_iter().for_each(|member| member.is_live = false),
             ApplicationEvent::Tick => {
                 self.members.retain(|_, member| now_us < member.heard_us + FORGOTTEN_US.max(4 * self.timeout_us))
             }
@@ -143,6 +206,12 @@ impl ApplicationLock {
             rests_until_us: 0,
             rest_us: FIRST_REST_US,
             good_frames: 0,
+            live_since_us: now_us,
+            failures: 0,
+            failing_since_us: now_us,
+            is_late: false,
+            is_slow: false,
+            is_told: false,
         });
         member.heard_us = now_us;
         // A frame of the future is one of another run of the application; what is said again is no news.
@@ -150,11 +219,18 @@ impl ApplicationLock {
             return;
         }
         (member.ready, member.ready_us, member.took_us) = (frame, now_us, took_us);
+        if std::mem::take(&mut member.is_late) {
+            member.is_slow = !member.is_fast(self.timeout_us);
+            if member.is_slow && member.failures >= TELLING && !std::mem::replace(&mut member.is_told, true) {
+                let (times, within_us) = (member.failures, now_us - member.failing_since_us);
+                actions.push(ApplicationAction::TooSlow { display: id, times, within_us, took_us });
+            }
+        }
         // The others take their time for the last frame, and it turns to that too. If it will be in time, it is waited for.
         let spent_us = now_us - self.published_us;
         if is_waiting && frame < current && member.is_fast(self.timeout_us.saturating_sub(spent_us)) && member.may_come_in(now_us)
         {
-            member.is_live = true;
+            member.comes_in(now_us);
             actions.push(ApplicationAction::Admitted(id));
         }
     }
@@ -170,16 +246,10 @@ impl ApplicationLock {
         }
         for (id, member) in self.members.iter_mut().filter(|(_, member)| member.is_live) {
             if member.ready < frame {
-                member.is_live = false;
-                member.good_frames = 0;
-                member.rests_until_us = now_us + member.rest_us;
-                member.rest_us = LONGEST_REST_US.min(2 * member.rest_us);
+                member.fails(now_us);
                 actions.push(ApplicationAction::Dropped(*id, frame));
-                continue;
-            }
-            member.good_frames += 1;
-            if member.good_frames >= GOOD_FRAMES {
-                member.rest_us = FIRST_REST_US;
+            } else {
+                member.succeeds(now_us);
             }
         }
         self.released = frame;

@@ -45,6 +45,8 @@ pub enum DisplayEvent {
     Diverged(u64),
     /// The frame was drawn.
     Drawn(u64),
+    /// An application can be asked from now on. What was asked for before went to nobody.
+    Linked,
     /// Nothing more has come for now; at least every few milliseconds. Only then is anything drawn: what came during a long drawing would
     /// otherwise be drawn one by one, for ever behind the others.
     Tick,
@@ -166,6 +168,10 @@ impl DisplayLock {
                 }
                 self.advance(now_us, &mut actions);
             }
+            DisplayEvent::Linked => {
+                self.fetching_since_us = None;
+                self.advance(now_us, &mut actions);
+            }
             DisplayEvent::Tick => {
                 if self.drawn > self.shown && self.drawing.is_none() && now_us >= self.said_ready_us + REPEAT_US {
                     self.say_ready(now_us, &mut actions);
@@ -182,7 +188,9 @@ impl DisplayLock {
         if epoch > self.epoch {
             // What is being drawn goes on, but for nobody.
             let is_applying = self.is_applying;
-            *self = Self { epoch, is_applying, ..Self::default() };
+            // The first one that is heard of is the one that was asked.
+            let fetching_since_us = self.fetching_since_us.filter(|_| self.epoch == 0);
+            *self = Self { epoch, is_applying, fetching_since_us, ..Self::default() };
             actions.push(DisplayAction::Forget);
         }
         epoch == self.epoch

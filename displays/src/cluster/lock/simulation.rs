@@ -110,6 +110,7 @@ struct Tally {
     steps: u64,
     shown: u64,
     drops: u64,
+    told_slow: u64,
     fetches: u64,
     diverged: u64,
     restarts: u64,
@@ -121,6 +122,8 @@ struct Simulation {
     dice: Dice,
     faults: Faults,
     pace: Pace,
+    /// One that draws at another pace.
+    slow: Option<(usize, Pace)>,
     now_us: TimeUs,
     queue: BinaryHeap<Reverse<(TimeUs, u64)>>,
     messages: BTreeMap<u64, (Address, DisplayId, Message)>,
@@ -141,6 +144,7 @@ impl Simulation {
             dice: Dice(seed),
             faults,
             pace,
+            slow: None,
             now_us: 0,
             queue: BinaryHeap::new(),
             messages: BTreeMap::new(),
@@ -257,6 +261,10 @@ impl Simulation {
                     }
                 }
                 ApplicationAction::Dropped(..) => self.tally.drops += 1,
+                ApplicationAction::TooSlow { took_us, .. } => {
+                    assert!(took_us > TIMEOUT_US / 2);
+                    self.tally.told_slow += 1;
+                }
                 ApplicationAction::Admitted(_) => {}
             }
         }
@@ -342,9 +350,10 @@ impl Simulation {
                     self.display_steps(place, if agrees { DisplayEvent::Applied(frame) } else { DisplayEvent::Diverged(frame) });
                 }
                 DisplayAction::Draw(frame) => {
+                    let pace = self.slow.filter(|(slow, _)| *slow == place).map_or(self.pace, |(_, pace)| pace);
                     let draws_us = match std::mem::take(&mut display.is_cold) {
-                        true => self.pace.first_us + self.dice.below(self.pace.first_us),
-                        false => self.pace.each_us / 2 + self.dice.below(self.pace.each_us),
+                        true => pace.first_us + self.dice.below(pace.first_us),
+                        false => pace.each_us / 2 + self.dice.below(pace.each_us),
                     };
                     let display = &mut self.displays[place];
                     display.took_us = draws_us;
@@ -482,4 +491,34 @@ fn the_lock_holds_in_every_run() {
     }
     println!("{all:?}");
     assert!(all.drops > 0 && all.diverged > 0 && all.restarts > 0, "no fault showed: {all:?}");
+}
+
+/// One display of three needs half to one and a half times the timeout for a frame. Each time that it is waited for in vain costs the
+/// others the timeout, so that it must become rare.
+#[test]
+fn a_display_that_is_too_slow_holds_the_others_up_less_and_less() {
+    let faults = Faults { lost: 0, repeated: 0, longest_us: 300, disasters: false };
+    let pace = Pace { first_us: 100_000, each_us: 4_000 };
+    let too_slow = Pace { first_us: 300_000, each_us: TIMEOUT_US };
+    for seed in 0..20 {
+        let mut simulation = Simulation::new(seed, 3, faults, pace);
+        simulation.slow = Some((1, too_slow));
+        let mut drops = Vec::new();
+        for end_s in [5, 30, 60] {
+            simulation.run_until(end_s * 1_000_000);
+            drops.push(simulation.tally.drops);
+        }
+        assert!(drops[2] - drops[1] <= 4, "seed {seed}: late {drops:?} times by the 5th, 30th and 60th second");
+        assert_eq!(simulation.tally.told_slow, 1, "seed {seed}");
+        // Once it is as fast as the others, they wait for it again, and it is told of anew when it becomes slow.
+        simulation.slow = None;
+        simulation.run_until(60_000_000 + 14_000_000);
+        assert_eq!(simulation.application.live().count(), 3, "seed {seed}");
+        let dropped = simulation.tally.drops;
+        simulation.run_until(140_000_000);
+        assert_eq!((simulation.tally.drops, simulation.tally.told_slow), (dropped, 1), "seed {seed}");
+        simulation.slow = Some((1, too_slow));
+        simulation.run_until(170_000_000);
+        assert_eq!(simulation.tally.told_slow, 2, "seed {seed}");
+    }
 }
