@@ -63,8 +63,14 @@ fn free_address() -> Result<String, Failure> {
 
 fn display(endpoint: String, name: &str, uses_memory: bool) -> Result<(), Failure> {
     let types: Vec<NodeType> = node_types().into_iter().chain(builtin_types()).collect();
-    let options =
-        FollowerOptions { endpoint, security: Security::Loopback, lease: LEASE, ends_with_application: true, uses_memory };
+    let options = FollowerOptions {
+        endpoint,
+        security: Security::Loopback,
+        lease: LEASE,
+        ends_with_application: true,
+        uses_memory,
+        cache: None,
+    };
     let mut follower = Follower::connect(options, name, TypeRegistry::from(types))?;
     while !follower.is_over() {
         follower.run(&mut Blind, Duration::from_millis(50))?;

@@ -2,12 +2,14 @@
 #![cfg(feature = "cluster")]
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use umbriel_displays::cluster::{
-    ClusterError, Event, Follower, FollowerOptions, Guest, Host, HostOptions, LEASE, Proxy, Screen, Security, make_certificates,
+    CacheOptions, ClusterError, Event, Follower, FollowerOptions, Guest, Host, HostOptions, LEASE, Proxy, Screen, Security,
+    make_certificates,
 };
 use umbriel_displays::navigation::Input as Motion;
 use umbriel_fields::Graph;
@@ -35,9 +37,18 @@ impl Screen for Seen {
 }
 
 fn join(endpoint: &str, security: Security, name: &str) -> Result<Follower, ClusterError> {
-    let options =
-        FollowerOptions { endpoint: endpoint.into(), security, lease: LEASE, ends_with_application: false, uses_memory: true };
-    Follower::connect(options, name, types())
+    Follower::connect(FollowerOptions { security, ..options(endpoint) }, name, types())
+}
+
+fn options(endpoint: &str) -> FollowerOptions {
+    FollowerOptions {
+        endpoint: endpoint.into(),
+        security: Security::Loopback,
+        lease: LEASE,
+        ends_with_application: false,
+        uses_memory: true,
+        cache: None,
+    }
 }
 
 fn types() -> Vec<umbriel_fields::NodeType> {
@@ -56,11 +67,16 @@ fn certificates(name: &str) -> PathBuf {
     folder
 }
 
+/// Places in a long list of the world.
+const LONG: usize = 10_000;
+
 /// Publishes frames until told to end, the first transform at x = frame, scaled by the last turn of the wheel that a display told of.
 fn serve(endpoint: &str, security: Security, end: &AtomicBool) -> Host {
     let mut graph = new_graph();
     let turner = graph.create("Transform").unwrap();
     graph.set_name(turner, "turner").unwrap();
+    let path = graph.create("PositionInterpolator").unwrap();
+    graph.set_named(path, "key_value", (0..LONG).map(|place| Vec3::splat(place as f32)).collect::<Vec<Vec3>>()).unwrap();
     let options =
         HostOptions { listen: endpoint.into(), security, timeout: Duration::from_millis(500), lease: LEASE, ahead: true };
     let mut host = Host::listen(&options).unwrap();
@@ -198,14 +214,7 @@ fn frames_come_out_of_memory_only_while_the_line_stands() {
     std::thread::scope(|scope| {
         let host = scope.spawn(|| serve(&format!("tcp/127.0.0.1:{port}"), Security::Loopback, &end));
         let through = |uses_memory: bool, name: &str| {
-            let endpoint = format!("tcp/127.0.0.1:{}", proxy.port());
-            let options = FollowerOptions {
-                endpoint,
-                security: Security::Loopback,
-                lease: LEASE,
-                ends_with_application: false,
-                uses_memory,
-            };
+            let options = FollowerOptions { uses_memory, ..options(&format!("tcp/127.0.0.1:{}", proxy.port())) };
             Follower::connect(options, name, types()).unwrap()
         };
         let (mut near, mut far) = (through(true, "near"), through(false, "far"));
@@ -284,6 +293,42 @@ fn the_short_line_is_for_who_knows_the_application() {
         assert!(reports.iter().all(|report| report.disagreed == 0));
     });
     drop(squatter);
+}
+
+#[test]
+fn long_values_are_fetched_once_for_all_starts() {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("long values");
+    let _ = std::fs::remove_dir_all(&folder);
+    let endpoint = format!("tcp/127.0.0.1:{}", free_port());
+    let end = AtomicBool::new(false);
+    let start = |folder: &std::path::Path| {
+        let cache = Some(CacheOptions { folder: folder.into(), room: 1 << 30 });
+        let mut display = Follower::connect(FollowerOptions { cache, ..options(&endpoint) }, "wall", types()).unwrap();
+        assert!(follow(&mut display, &mut Seen::default(), |seen| seen.shown.len() > 2).unwrap());
+        let graph = display.replica().unwrap().graph();
+        let path = graph.nodes().find(|node| graph.get_named::<Arc<[Vec3]>>(*node, "key_value").is_ok()).unwrap();
+        assert_eq!(graph.get_named::<Arc<[Vec3]>>(path, "key_value").unwrap().len(), LONG);
+        (display.report().fetched, display.report().kept)
+    };
+    let files = || std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect::<Vec<_>>();
+    std::thread::scope(|scope| {
+        let host = scope.spawn(|| serve(&endpoint, Security::Loopback, &end));
+        let first = start(&folder);
+        let kept = files();
+        let second = start(&folder);
+        kept.iter().for_each(|file| std::fs::write(file, "garbage").unwrap());
+        let damaged = start(&folder);
+        let mended = start(&folder);
+        // A folder that cannot be made.
+        std::fs::write(folder.join("file"), "").unwrap();
+        let without = [start(&folder.join("file")), start(&folder.join("file"))];
+        end.store(true, Ordering::Relaxed);
+        host.join().unwrap();
+        let bytes = first.0;
+        assert!(bytes >= 12 * LONG as u64, "{bytes}");
+        assert_eq!((first.1, kept.len(), second), (0, 1, (0, bytes)));
+        assert_eq!((damaged, mended, without), ((bytes, 0), (0, bytes), [(bytes, 0); 2]));
+    });
 }
 
 /// A program of somebody else with a certificate of ours.

@@ -2,9 +2,9 @@
 
 use super::positive;
 use clap::{Args, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
-use umbriel_displays::cluster::LEASE;
+use umbriel_displays::cluster::{CacheOptions, LEASE};
 
 /// How links between processes are protected.
 #[derive(Args, Debug)]
@@ -23,6 +23,29 @@ pub(crate) struct Link {
 impl Link {
     pub(crate) fn lease(&self) -> Duration {
         Duration::from_millis(self.lease_ms)
+    }
+}
+
+/// Where displays keep meshes and images from one start to the next.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Kept {
+    /// Folder for meshes and images, which are then not fetched again at the next start, or `none`; otherwise `umbriel` among the user's caches
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) cache: Option<PathBuf>,
+    /// Room in it, in mebibytes; what was not used for longest goes
+    #[arg(long, default_value_t = 1024, value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    pub(crate) cache_mib: u64,
+}
+
+impl Kept {
+    /// None where nothing is to be kept, or nobody knows where.
+    pub(crate) fn options(&self) -> Option<CacheOptions> {
+        let folder = match &self.cache {
+            Some(none) if none == Path::new("none") => return None,
+            Some(folder) => folder.clone(),
+            None => dirs::cache_dir()?.join("umbriel"),
+        };
+        Some(CacheOptions { folder, room: self.cache_mib << 20 })
     }
 }
 
@@ -97,6 +120,8 @@ pub(crate) struct Display {
     pub(crate) show: String,
     #[command(flatten)]
     pub(crate) link: Link,
+    #[command(flatten)]
+    pub(crate) kept: Kept,
     /// Draw without a window
     #[arg(long)]
     pub(crate) headless: bool,
@@ -154,6 +179,8 @@ pub(crate) struct Cluster {
     /// Change a value in the first display's replica after this frame
     #[arg(long)]
     pub(crate) corrupt: Option<u64>,
+    #[command(flatten)]
+    pub(crate) kept: Kept,
     /// Folder for the pictures; otherwise one that is removed at the end
     #[arg(long)]
     pub(crate) out: Option<PathBuf>,

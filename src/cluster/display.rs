@@ -70,6 +70,7 @@ impl Process<'_> {
             lease: args.link.lease(),
             ends_with_application: args.once,
             uses_memory: true,
+            cache: args.kept.options(),
         };
         Ok(Process {
             args,
@@ -174,10 +175,12 @@ fn summary(follower: &Follower) -> String {
     let report = follower.report();
     let differences: Vec<String> = report.differences.iter().map(|difference| format!("; differed: {difference}")).collect();
     format!(
-        "shown={} snapshots={} longest_gap_ms={:.1} differences={}{}",
+        "shown={} snapshots={} longest_gap_ms={:.1} fetched_bytes={} kept_bytes={} differences={}{}",
         report.shown,
         report.snapshots,
         report.longest_gap_ms,
+        report.fetched,
+        report.kept,
         report.differences.len(),
         differences.concat()
     )

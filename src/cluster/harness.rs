@@ -133,6 +133,11 @@ impl Launcher<'_> {
         command.args(["--once", "--show", show, "--connect", &wire.endpoint()]);
         command.args((!self.args.windows).then_some("--headless"));
         command.args(["--lease-ms", &lease(self.args).as_millis().to_string()]);
+        let kept = &self.args.kept;
+        if let Some(folder) = &kept.cache {
+            command.arg("--cache").arg(folder);
+        }
+        command.args(["--cache-mib", &kept.cache_mib.to_string()]);
         if self.args.check {
             command.arg("--out").arg(self.folder.join(file_name(show)));
         }

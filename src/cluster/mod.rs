@@ -10,6 +10,7 @@ mod netns;
 mod refusals;
 mod screen;
 mod serve;
+mod strangers;
 mod wire;
 
 pub(crate) use display::display;

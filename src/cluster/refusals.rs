@@ -1,6 +1,8 @@
 //! Connections that the network library refuses, told to the operator in words.
 
+use super::strangers::strangers;
 use std::fmt::Debug;
+use std::net::IpAddr;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use tracing::field::{Field, Visit};
@@ -17,7 +19,7 @@ const QUIET: Duration = Duration::from_secs(10);
 /// Hears of refused connections and requests, and logs them anew.
 #[derive(Default)]
 pub(crate) struct Refusals {
-    told: Mutex<Option<(String, Instant)>>,
+    told: Mutex<Vec<(String, Instant)>>,
 }
 
 impl Refusals {
@@ -27,9 +29,10 @@ impl Refusals {
 
     fn tell(&self, text: String) {
         let Ok(mut told) = self.told.lock() else { return };
-        if !told.as_ref().is_some_and(|(last, when)| *last == text && when.elapsed() < QUIET) {
+        told.retain(|(_, when)| when.elapsed() < QUIET);
+        if !told.iter().any(|(known, _)| *known == text) {
             tracing::warn!("{text}");
-            *told = Some((text, Instant::now()));
+            told.push((text, Instant::now()));
         }
     }
 }
@@ -42,11 +45,18 @@ impl<S: Subscriber> Layer<S> for Refusals {
             event.record(&mut text);
         }
         if let Some(reason) = text.0.strip_suffix(HINT) {
-            self.tell(format!("a connection was refused: {}", in_words(reason)));
+            self.tell(refusal(reason, &strangers().into_iter().collect::<Vec<_>>()));
         } else if let Some(text) = denied(&text.0) {
             self.tell(text);
         }
     }
+}
+
+/// A refused connection, with whom it was from if that is known.
+fn refusal(reason: &str, from: &[IpAddr]) -> String {
+    let from: Vec<String> = from.iter().map(ToString::to_string).collect();
+    let from = if from.is_empty() { String::new() } else { format!(" from {}", from.join(" or ")) };
+    format!("a connection{from} was refused: {}", in_words(reason))
 }
 
 /// What access control says of messages that it does not let in.

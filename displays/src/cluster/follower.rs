@@ -9,6 +9,7 @@ use zenoh::Wait;
 use zenoh::pubsub::Publisher as ZenohPublisher;
 use zenoh::qos::{CongestionControl, Priority};
 
+use super::cache::{Cache, CacheOptions};
 use super::event::Event;
 use super::line::{Answer, Line, Link};
 use super::lock::{DisplayAction, DisplayEvent, DisplayLock};
@@ -41,6 +42,8 @@ pub struct FollowerOptions {
     pub ends_with_application: bool,
     /// Where the application runs on the same machine, frames are read out of its memory.
     pub uses_memory: bool,
+    /// Where long values are kept from one start to the next.
+    pub cache: Option<CacheOptions>,
 }
 
 /// What happened to a display.
@@ -54,6 +57,10 @@ pub struct FollowerReport {
     pub differences: Vec<String>,
     /// The longest time between two frames that were shown, milliseconds.
     pub longest_gap_ms: f64,
+    /// Bytes of long values, such as meshes and images, that came from the application.
+    pub fetched: u64,
+    /// Bytes of those that were kept from an earlier start.
+    pub kept: u64,
 }
 
 /// When a display came how far for the first time.
@@ -141,9 +148,10 @@ impl Follower {
     /// Joins the application, now or as soon as it is there. `name` is that of the display; `types` are those that can
     /// be drawn.
     pub fn connect(options: FollowerOptions, name: &str, types: impl Into<TypeRegistry>) -> Result<Follower, ClusterError> {
-        let FollowerOptions { endpoint, security, lease, ends_with_application, uses_memory } = options;
+        let FollowerOptions { endpoint, security, lease, ends_with_application, uses_memory, cache } = options;
         let subject = (RELEASE, Arrived::Release as fn(Vec<u8>) -> Arrived);
-        let link = Link { end: End::Display, endpoint: &endpoint, security: &security, lease, uses_memory };
+        let cache = cache.map(Cache::open);
+        let link = Link { end: End::Display, endpoint: &endpoint, security: &security, lease, uses_memory, cache };
         let mut line = Line::open(link, Arrived::Frame, subject, Arrived::Application)?;
         let declare = |key: &'static str| {
             let publisher = line.session.declare_publisher(key).congestion_control(CongestionControl::Drop);
@@ -316,9 +324,11 @@ impl Follower {
             Arrived::Snapshot(Err(reason)) => tracing::debug!("no snapshot: {reason}"),
             Arrived::Bulk(hash, Ok(bytes)) => {
                 self.line.bulk_answered(hash);
-                if let Err(error) = self.bulk.learn(hash, &bytes) {
-                    tracing::error!("{error}");
+                match self.bulk.learn(hash, &bytes) {
+                    Ok(()) => self.line.keep_bulk(hash, bytes),
+                    Err(error) => tracing::error!("{error}"),
                 }
+                [self.report.fetched, self.report.kept] = self.line.fetched;
             }
             Arrived::Bulk(hash, Err(reason)) => {
                 self.line.bulk_answered(hash);

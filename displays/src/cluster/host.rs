@@ -248,9 +248,10 @@ impl Host {
 
     fn joins(&mut self, graph: &Graph, query: Query) {
         let answer = match query.payload().map(|payload| message_of::<Join>(&payload.to_bytes())) {
-            Some(Ok(join)) if join.protocol != PROTOCOL => {
-                Err(format!("it speaks version {} of the protocol, the application speaks {PROTOCOL}", join.protocol))
-            }
+            Some(Ok(join)) if join.protocol != PROTOCOL => Err(format!(
+                "it speaks version {} of the protocol, the application speaks {PROTOCOL} (display `{}`)",
+                join.protocol, join.name
+            )),
             Some(Ok(join)) if enter(&self.gate).twin(join.display, &join.name).is_some() => {
                 Err(format!("there is a display `{}` already", join.name))
             }

@@ -10,6 +10,7 @@ use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
+use super::cache::Cache;
 use super::frames::Frames;
 use super::message::{APPLICATION, BULK};
 use super::near::{Bell, Word};
@@ -33,6 +34,8 @@ pub(super) struct Link<'a> {
     pub(super) lease: Duration,
     /// Frames may be read out of the application's memory.
     pub(super) uses_memory: bool,
+    /// Where long values are kept.
+    pub(super) cache: Option<Cache>,
 }
 
 /// Where things arrive; rings for who waits at the short line.
@@ -63,6 +66,9 @@ pub(super) struct Line<A> {
     post: Post<A>,
     /// Long values that were asked for and have not come.
     asked: BTreeSet<u64>,
+    cache: Option<Cache>,
+    /// Bytes of long values that were fetched, and of those that were here.
+    pub(super) fetched: [u64; 2],
     frames: Frames,
     subject: Subject<A>,
     /// Told of the subject, unless it is the short line that tells.
@@ -76,7 +82,7 @@ impl<A: Send + 'static> Line<A> {
     /// Links to an application, now or as soon as it is there. `frame` and `subject` are what it publishes, `application` tells that it came
     /// or went.
     pub(super) fn open(
-        Link { end, endpoint, security, lease, uses_memory }: Link<'_>,
+        Link { end, endpoint, security, lease, uses_memory, cache }: Link<'_>,
         frame: fn(Vec<u8>) -> A,
         subject: Subject<A>,
         application: fn(bool) -> A,
@@ -94,7 +100,21 @@ impl<A: Send + 'static> Line<A> {
         let _alive = alive.wait().map_err(network)?;
         let short = Short::at(port_of(endpoint).filter(|_| end == End::Display && uses_memory));
         let (asked, over_network) = (BTreeSet::new(), None);
-        let mut line = Line { session, id, arrived, post, asked, frames, subject, over_network, short, _token: None, _alive };
+        let mut line = Line {
+            session,
+            id,
+            arrived,
+            post,
+            asked,
+            cache,
+            fetched: [0; 2],
+            frames,
+            subject,
+            over_network,
+            short,
+            _token: None,
+            _alive,
+        };
         line.follow()?;
         Ok(line)
     }
@@ -185,10 +205,16 @@ impl<A: Send + 'static> Line<A> {
         }
     }
 
-    /// Asks for long values, each once until its answer came.
+    /// Asks for long values, each once until its answer came; what is in the cache arrives from there.
     pub(super) fn ask_for_bulk(&mut self, missing: Vec<u64>, arrived: fn(u64, Answer) -> A) {
         for hash in missing {
-            if self.asked.insert(hash) {
+            if !self.asked.insert(hash) {
+                continue;
+            }
+            if let Some(message) = self.cache.as_mut().and_then(|cache| cache.get(hash)) {
+                self.fetched[1] += message.len() as u64;
+                self.post.send(arrived(hash, Ok(message)));
+            } else {
                 self.get(format!("{BULK}/{hash:016x}"), Vec::new(), move |answer| arrived(hash, answer));
             }
         }
@@ -197,6 +223,20 @@ impl<A: Send + 'static> Line<A> {
     /// The answer about a long value came.
     pub(super) fn bulk_answered(&mut self, hash: u64) {
         self.asked.remove(&hash);
+    }
+
+    /// Keeps a long value that came, for the next start.
+    pub(super) fn keep_bulk(&mut self, hash: u64, message: Vec<u8>) {
+        match &mut self.cache {
+            // It came from there.
+            Some(cache) if cache.has(hash) => {}
+            cache => {
+                self.fetched[0] += message.len() as u64;
+                if let Some(cache) = cache {
+                    cache.put(hash, message);
+                }
+            }
+        }
     }
 
     /// True while answers about long values are awaited.

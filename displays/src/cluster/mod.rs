@@ -8,6 +8,8 @@ pub mod guests;
 pub mod lock;
 
 #[cfg(feature = "cluster")]
+mod cache;
+#[cfg(feature = "cluster")]
 mod certificates;
 #[cfg(feature = "cluster")]
 mod event;
@@ -46,6 +48,7 @@ mod waits;
 
 #[cfg(feature = "cluster")]
 pub use self::{
+    cache::CacheOptions,
     certificates::make as make_certificates,
     event::{Event, Input, Motion, Pointing},
     follower::{Follower, FollowerOptions, FollowerReport, Progress, Screen},

@@ -18,7 +18,11 @@ const IMAGE: u8 = 1;
 
 /// A hash of what an image shows.
 pub(super) fn hash_of_image(image: &Image) -> u64 {
-    xxh3_64_with_seed(&image.rgba, (image.width as u64) << 32 | image.height as u64)
+    hash_of_pixels([image.width, image.height], &image.rgba)
+}
+
+fn hash_of_pixels([width, height]: [u32; 2], rgba: &[u8]) -> u64 {
+    xxh3_64_with_seed(rgba, u64::from(width) << 32 | u64::from(height))
 }
 
 /// A hash of a long value.
@@ -33,6 +37,44 @@ pub(super) fn message_of_image(image: &Image) -> Arc<[u8]> {
 
 pub(super) fn message_of_value(bytes: &[u8]) -> Arc<[u8]> {
     std::iter::once(VALUE).chain(bytes.iter().copied()).collect()
+}
+
+/// A long value in the message that it goes by.
+enum Long<'a> {
+    Value(&'a [u8]),
+    /// Its size, and RGBA.
+    Image([u32; 2], &'a [u8]),
+}
+
+impl Long<'_> {
+    fn hash(&self) -> u64 {
+        match self {
+            Long::Value(bytes) => hash_of_value(bytes),
+            Long::Image(size, rgba) => hash_of_pixels(*size, rgba),
+        }
+    }
+}
+
+fn read(message: &[u8]) -> Option<Long<'_>> {
+    match message.split_first()? {
+        (&VALUE, bytes) => Some(Long::Value(bytes)),
+        (&IMAGE, bytes) => {
+            let (head, rgba) = bytes.split_at_checked(8)?;
+            let size = [0, 4].map(|at| u32::from_le_bytes(std::array::from_fn(|byte| head[at + byte])));
+            let is_whole = u64::from(size[0]) * u64::from(size[1]) * 4 == rgba.len() as u64;
+            is_whole.then_some(Long::Image(size, rgba))
+        }
+        _ => None,
+    }
+}
+
+fn wrong(hash: u64) -> ReplicaError {
+    damaged(format!("a long value is not what its hash {hash:016x} says"))
+}
+
+/// The hash of what a message of [`super::Publisher::bulk`] holds; none where it is no such message.
+pub fn hash_of_long_value(message: &[u8]) -> Option<u64> {
+    read(message).map(|long| long.hash())
 }
 
 /// Hashes of images, kept as long as the images live.
@@ -72,28 +114,13 @@ impl Bulk {
         if self.has(hash) {
             return Ok(());
         }
-        let wrong = || damaged(format!("a long value is not what its hash {hash:016x} says"));
-        let found = match message.split_first() {
-            Some((&VALUE, bytes)) => {
-                self.values.insert(hash, bytes.into());
-                hash_of_value(bytes)
+        match read(message) {
+            Some(long) if long.hash() != hash => return Err(wrong(hash)),
+            Some(Long::Value(bytes)) => drop(self.values.insert(hash, bytes.into())),
+            Some(Long::Image([width, height], rgba)) => {
+                drop(self.images.insert(hash, Arc::new(Image { width, height, rgba: rgba.into() })));
             }
-            Some((&IMAGE, bytes)) => {
-                let (head, rgba) = bytes.split_at_checked(8).ok_or_else(wrong)?;
-                let number = |at: usize| u32::from_le_bytes(std::array::from_fn(|byte| head[at + byte]));
-                let image = Image { width: number(0), height: number(4), rgba: rgba.into() };
-                if image.width as u64 * image.height as u64 * 4 != rgba.len() as u64 {
-                    return Err(wrong());
-                }
-                let found = hash_of_image(&image);
-                self.images.insert(hash, Arc::new(image));
-                found
-            }
-            _ => return Err(wrong()),
-        };
-        if found != hash {
-            self.forget(hash);
-            return Err(wrong());
+            None => return Err(wrong(hash)),
         }
         self.ages.push_back((hash, message.len()));
         self.bytes += message.len();

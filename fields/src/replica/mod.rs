@@ -28,7 +28,7 @@ mod runs;
 mod shares;
 
 pub use apply::Replica;
-pub use bulk::Bulk;
+pub use bulk::{Bulk, hash_of_long_value};
 pub use deeds::{Deed, node_numbered, number_of, own_key};
 pub use difference::Difference;
 pub use mirror::{Deeds, Mirror};

@@ -113,7 +113,7 @@ impl Guest {
         fresh: fn() -> Graph,
     ) -> Result<Guest, ClusterError> {
         let subject = (WORD, Arrived::Word as fn(Vec<u8>) -> Arrived);
-        let link = Link { end: End::Guest, endpoint, security, lease: LEASE, uses_memory: true };
+        let link = Link { end: End::Guest, endpoint, security, lease: LEASE, uses_memory: true, cache: None };
         let mut line = Line::open(link, Arrived::Frame, subject, Arrived::Host)?;
         let deeds = line.session.declare_publisher(DEEDS).congestion_control(CongestionControl::Block).wait().map_err(network)?;
         line.announce(GUEST)?;

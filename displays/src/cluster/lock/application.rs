@@ -57,7 +57,7 @@ pub enum ApplicationAction {
         times: u32,
         /// In how long.
         within_us: TimeUs,
-        /// How long it drew last.
+        /// How long it drew at the most.
         took_us: TimeUs,
     },
 }
@@ -82,8 +82,8 @@ struct Member {
     failing_since_us: TimeUs,
     /// It was left behind, and has not drawn anything since.
     is_late: bool,
-    /// What it was late with took it too long to draw.
-    is_slow: bool,
+    /// The longest that it drew something that it was late with, where that is too long.
+    too_long_us: TimeUs,
     is_told: bool,
 }
 
@@ -113,7 +113,7 @@ impl Member {
     }
 
     fn longest_rest_us(&self) -> TimeUs {
-        if self.is_slow { LONGEST_REST_OF_SLOW_US } else { LONGEST_REST_US }
+        if self.too_long_us > 0 { LONGEST_REST_OF_SLOW_US } else { LONGEST_REST_US }
     }
 
     /// Was in time once more.
@@ -121,7 +121,7 @@ impl Member {
         self.good_frames += 1;
         if self.good_frames >= GOOD_FRAMES && now_us >= self.live_since_us + GOOD_RESTS * self.rest_us {
             (self.rest_us, self.failures) = (FIRST_REST_US, 0);
-            (self.is_slow, self.is_told) = (false, false);
+            (self.too_long_us, self.is_told) = (0, false);
         }
     }
 }
@@ -210,7 +210,7 @@ impl ApplicationLock {
             failures: 0,
             failing_since_us: now_us,
             is_late: false,
-            is_slow: false,
+            too_long_us: 0,
             is_told: false,
         });
         member.heard_us = now_us;
@@ -220,9 +220,12 @@ impl ApplicationLock {
         }
         (member.ready, member.ready_us, member.took_us) = (frame, now_us, took_us);
         if std::mem::take(&mut member.is_late) {
-            member.is_slow = !member.is_fast(self.timeout_us);
-            if member.is_slow && member.failures >= TELLING && !std::mem::replace(&mut member.is_told, true) {
+            if !member.is_fast(self.timeout_us) {
+                member.too_long_us = member.too_long_us.max(took_us);
+            }
+            if member.too_long_us > 0 && member.failures >= TELLING && !std::mem::replace(&mut member.is_told, true) {
                 let (times, within_us) = (member.failures, now_us - member.failing_since_us);
+                let took_us = member.too_long_us;
                 actions.push(ApplicationAction::TooSlow { display: id, times, within_us, took_us });
             }
         }

@@ -82,7 +82,7 @@ pub struct DisplayLock {
     drawing: Option<u64>,
     drawn: u64,
     shown: u64,
-    /// The last frame that the application let others show. Earlier ones are not worth drawing, except to be warm.
+    /// The last frame that the application let others show. Those before it are not worth drawing, except to be warm.
     released: u64,
     /// Nothing was drawn since the last snapshot: pipelines, meshes and textures are not on the GPU yet.
     is_cold: bool,
@@ -236,7 +236,8 @@ impl DisplayLock {
     fn draw(&mut self, now_us: TimeUs, actions: &mut Vec<DisplayAction>) {
         let Some(applied) = self.applied.filter(|_| !self.is_applying && self.drawing.is_none()) else { return };
         let has_next = self.waiting.first() == Some(&(applied + 1));
-        let is_wanted = applied > self.drawn && (self.is_cold || applied > self.released);
+        // Where nobody is waited for, a frame comes together with its release: who never drew it would never be in step.
+        let is_wanted = applied > self.drawn && (self.is_cold || applied >= self.released);
         if has_next || !is_wanted {
             return;
         }

@@ -94,6 +94,8 @@ struct Faults {
     repeated: u64,
     longest_us: u64,
     disasters: bool,
+    /// What the application says in one turn arrives together, as it does on the short line of one machine.
+    together: bool,
 }
 
 /// How fast displays draw.
@@ -132,6 +134,8 @@ struct Simulation {
     epoch: u64,
     world: u64,
     is_down_until_us: TimeUs,
+    /// How long what is said in this turn is on its way.
+    turn_us: TimeUs,
     published_us: TimeUs,
     displays: Vec<Display>,
     ids: u64,
@@ -153,6 +157,7 @@ impl Simulation {
             epoch: 1,
             world: 1,
             is_down_until_us: 0,
+            turn_us: 0,
             published_us: 0,
             displays: (0..displays).map(|place| Display::new(place as u64 + 1)).collect(),
             ids: displays as u64,
@@ -177,7 +182,8 @@ impl Simulation {
             if self.displays[place].is_cut_off || self.dice.chance(self.faults.lost) {
                 continue;
             }
-            let after_us = 30 + self.dice.below(self.faults.longest_us);
+            let is_news = self.faults.together && matches!(message, Message::Frame { .. } | Message::Release { .. });
+            let after_us = if is_news { self.turn_us } else { 30 + self.dice.below(self.faults.longest_us) };
             let from = self.displays[place].id;
             self.at(after_us, to, from, message.clone());
         }
@@ -199,6 +205,7 @@ impl Simulation {
     }
 
     fn application_gets(&mut self, from: DisplayId, message: Message) {
+        self.turn_us = 30 + self.dice.below(self.faults.longest_us);
         let place = self.displays.iter().position(|display| display.id == from);
         let is_down = self.now_us < self.is_down_until_us;
         match message {
@@ -288,9 +295,15 @@ impl Simulation {
         {
             self.display_handles(place, message);
         }
-        if self.now_us >= self.displays[place].busy_until_us {
+        if self.now_us >= self.displays[place].busy_until_us && !self.comes_more(place) {
             self.display_handles(place, Message::Tick);
         }
+    }
+
+    /// Does something else arrive at a display at this very moment?
+    fn comes_more(&self, place: usize) -> bool {
+        let mut now = self.queue.iter().filter(|Reverse((time_us, _))| *time_us == self.now_us);
+        now.any(|Reverse((_, number))| self.messages.get(number).is_some_and(|(to, ..)| *to == Some(place)))
     }
 
     fn display_handles(&mut self, place: usize, message: Message) {
@@ -416,7 +429,7 @@ impl Simulation {
 
     /// After the last fault everybody is back.
     fn heal(&mut self) {
-        self.faults = Faults { lost: 0, repeated: 0, longest_us: 400, disasters: false };
+        self.faults = Faults { lost: 0, repeated: 0, longest_us: 400, disasters: false, together: self.faults.together };
         self.displays.iter_mut().for_each(|display| display.is_cut_off = false);
         self.is_down_until_us = self.now_us.min(self.is_down_until_us);
         let healed_us = self.now_us;
@@ -459,6 +472,7 @@ fn run(seed: u64) -> Tally {
         repeated: [0, 20, 300][dice.below(3) as usize],
         longest_us: [300, 3_000, 40_000][dice.below(3) as usize],
         disasters: dice.below(4) > 0,
+        together: seed.is_multiple_of(2),
     };
     let displays = 1 + dice.below(7) as usize;
     let pace = Pace {
@@ -497,7 +511,7 @@ fn the_lock_holds_in_every_run() {
 /// others the timeout, so that it must become rare.
 #[test]
 fn a_display_that_is_too_slow_holds_the_others_up_less_and_less() {
-    let faults = Faults { lost: 0, repeated: 0, longest_us: 300, disasters: false };
+    let faults = Faults { lost: 0, repeated: 0, longest_us: 300, disasters: false, together: true };
     let pace = Pace { first_us: 100_000, each_us: 4_000 };
     let too_slow = Pace { first_us: 300_000, each_us: TIMEOUT_US };
     for seed in 0..20 {
