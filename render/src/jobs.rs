@@ -1,50 +1,81 @@
 //! What the shadow volumes are made of: one job per light that is added outside its shadow, one per film.
 
-use crate::cache::{GpuMesh, Slab};
+use crate::cache::{GpuMaterial, GpuMesh, Slab};
+use crate::cutouts::{Cutout, CutoutJob};
 use crate::deform::Deformer;
 use crate::draws::{Casting, Draws};
-use crate::lights::Lights;
+use crate::lights::{Lights, leaves_holes_to_maps};
 use crate::plan::{BLACK_FILM, Purpose};
 use crate::slots::Slots;
 use crate::stats::Problems;
 use crate::uniforms;
 use crate::volumes::{Cone, Seen, Surface, VolumeCaster, VolumeJob, VolumeLight};
 use glam::{Mat4, Vec3, Vec4};
-use umbriel_scene::{Aabb, AlphaMode, Light, LightKind, Mesh, Scene, ShadowMethod, StencilGroup, StencilMode, Topology};
+use umbriel_scene::{
+    Aabb, AlphaMode, Light, LightKind, Material, Mesh, Scene, ShadowMethod, StencilGroup, StencilMode, Topology,
+};
 
-/// All jobs of the frame and what each is for. Films are added to `films`.
+/// All jobs of the frame.
+#[derive(Default)]
+pub(crate) struct Jobs {
+    pub(crate) volumes: Vec<VolumeJob>,
+    /// What has holes, by the place of its volumes' job.
+    pub(crate) cutouts: Vec<CutoutJob>,
+    /// What each is for.
+    pub(crate) purposes: Vec<Purpose>,
+}
+
+/// What casters are made of.
+pub(crate) struct Things<'a> {
+    pub(crate) draws: &'a Draws,
+    pub(crate) meshes: &'a Slab<Mesh, Option<GpuMesh>>,
+    pub(crate) materials: &'a Slab<Material, GpuMaterial>,
+    pub(crate) deformer: &'a Deformer,
+}
+
+/// All jobs of the frame. Films are added to `films`.
 pub(crate) fn jobs(
     scene: &Scene,
     lights: &Lights,
-    draws: &Draws,
-    meshes: &Slab<Mesh, Option<GpuMesh>>,
-    deformer: &Deformer,
+    things: &Things<'_>,
     films: &mut Slots<uniforms::Film>,
     problems: &mut Problems,
-) -> (Vec<VolumeJob>, Vec<Purpose>) {
+) -> Jobs {
     let black = films.push(&uniforms::Film { color: [0.0, 0.0, 0.0, 1.0] });
     debug_assert_eq!(black, BLACK_FILM);
-    let caster = |index: usize| caster(scene, draws, meshes, deformer, index);
-    let (mut jobs, mut purposes) = (Vec::new(), Vec::new());
+    let mut jobs = Jobs::default();
     let is_film = |group: &StencilGroup| matches!(group.mode, StencilMode::Modulative(_));
     if lights.order.len() == lights.in_surface_pass && !scene.stencil_groups.iter().any(is_film) {
-        return (jobs, purposes);
+        return jobs;
     }
+    let draws = things.draws;
     let receivers = receivers(draws.drawn().map(|(i, _)| i), scene);
+    let mut push = |light: VolumeLight, members: &mut dyn Iterator<Item = usize>, purpose: Purpose| {
+        let (mut casters, mut cutouts) = (Vec::new(), Vec::new());
+        for index in members {
+            match draws.holed_by(index) {
+                None => casters.extend(things.caster(scene, index)),
+                Some(material) => cutouts.extend(things.cutout(scene, index, material)),
+            }
+        }
+        jobs.volumes.push(VolumeJob { light, casters, receivers });
+        jobs.cutouts.push(CutoutJob { light, receivers, cutouts });
+        jobs.purposes.push(purpose);
+    };
     for (place, &index) in lights.order.iter().enumerate().skip(lights.in_surface_pass) {
         let light = &scene.lights[index];
-        let casters = if light.shadows == ShadowMethod::Volume {
-            let whole = draws.drawn().filter(|(_, casting)| *casting == Casting::Whole);
-            whole.filter_map(|(index, _)| caster(index)).collect()
+        let (volume, purpose) = (volume_light(light), Purpose::Light(place));
+        if light.shadows == ShadowMethod::Volume {
+            let takes_holes = !leaves_holes_to_maps(light);
+            let casts = |casting| casting == Casting::Whole || casting == Casting::Holed && takes_holes;
+            push(volume, &mut draws.drawn().filter(|(_, casting)| casts(*casting)).map(|(index, _)| index), purpose);
         } else {
             let groups = scene.stencil_groups.iter().filter(|g| g.light == index && g.mode == StencilMode::Additive);
             let mut members: Vec<usize> = groups.flat_map(|g| g.casters.iter().copied()).collect();
             members.sort_unstable();
             members.dedup();
-            members.into_iter().filter_map(caster).collect()
-        };
-        jobs.push(VolumeJob { light: volume_light(light), casters, receivers });
-        purposes.push(Purpose::Light(place));
+            push(volume, &mut members.into_iter(), purpose);
+        }
     }
     for group in &scene.stencil_groups {
         let StencilMode::Modulative(film) = group.mode else { continue };
@@ -64,12 +95,11 @@ pub(crate) fn jobs(
         let [r, g, b, a] = film.color.to_array();
         let a = a * light.shadow_intensity.clamp(0.0, 1.0);
         let film = films.push(&uniforms::Film { color: [r * a, g * a, b * a, a] });
-        let casters = group.casters.iter().filter_map(|i| caster(*i)).collect();
         // A film darkens what is outside of the cone too.
-        jobs.push(VolumeJob { light: VolumeLight { cone: None, ..volume_light(light) }, casters, receivers });
-        purposes.push(Purpose::Film { film, light: group.light });
+        let everywhere = VolumeLight { cone: None, ..volume_light(light) };
+        push(everywhere, &mut group.casters.iter().copied(), Purpose::Film { film, light: group.light });
     }
-    (jobs, purposes)
+    jobs
 }
 
 fn volume_light(light: &Light) -> VolumeLight {
@@ -128,27 +158,39 @@ pub(crate) fn seen(drawables: impl Iterator<Item = usize>, scene: &Scene, view_f
 /// Triangles of a mesh whose triangles are looked at one by one for what they hide: walls, quays, grounds.
 const MOST_HIDING: usize = 64;
 
-fn caster(
-    scene: &Scene,
-    draws: &Draws,
-    meshes: &Slab<Mesh, Option<GpuMesh>>,
-    deformer: &Deformer,
-    index: usize,
-) -> Option<VolumeCaster> {
-    let drawable = scene.drawables.get(index)?;
-    let (mesh, deformed) = draws.mesh_of(index)?;
-    let rest = meshes.get(mesh)?.as_ref()?;
-    let deformed = deformed.and_then(|d| deformer.get(d));
-    Some(VolumeCaster {
-        mesh: meshes.key(mesh)?.clone(),
-        positions: deformed.map_or(&rest.positions, |d| &d.positions).clone(),
-        positions_revision: deformed.map_or(0, |d| d.revision),
-        world_from_object: drawable.world_from_object,
-        bounds_in_world: drawable.bounds_in_world,
-        surface: match drawable.material.alpha {
-            AlphaMode::Opaque if drawable.material.double_sided => Surface::BothSides,
-            AlphaMode::Opaque if deformed.is_none() => Surface::Front,
-            _ => Surface::InParts,
-        },
-    })
+impl Things<'_> {
+    fn caster(&self, scene: &Scene, index: usize) -> Option<VolumeCaster> {
+        let drawable = scene.drawables.get(index)?;
+        let (mesh, deformed) = self.draws.mesh_of(index)?;
+        let rest = self.meshes.get(mesh)?.as_ref()?;
+        let deformed = deformed.and_then(|d| self.deformer.get(d));
+        Some(VolumeCaster {
+            mesh: self.meshes.key(mesh)?.clone(),
+            positions: deformed.map_or(&rest.positions, |d| &d.positions).clone(),
+            positions_revision: deformed.map_or(0, |d| d.revision),
+            world_from_object: drawable.world_from_object,
+            bounds_in_world: drawable.bounds_in_world,
+            surface: match drawable.material.alpha {
+                AlphaMode::Opaque if drawable.material.double_sided => Surface::BothSides,
+                AlphaMode::Opaque if deformed.is_none() => Surface::Front,
+                _ => Surface::InParts,
+            },
+        })
+    }
+
+    fn cutout(&self, scene: &Scene, index: usize, material: u32) -> Option<Cutout> {
+        let drawable = scene.drawables.get(index)?;
+        let (mesh, deformed) = self.draws.mesh_of(index)?;
+        let rest = self.meshes.get(mesh)?.as_ref().filter(|mesh| mesh.topology == Topology::Triangles)?;
+        let deformed = deformed.and_then(|d| self.deformer.get(d));
+        Some(Cutout {
+            positions: deformed.map_or(&rest.positions, |d| &d.positions).clone(),
+            indices: rest.indices.clone(),
+            attributes: rest.attributes.clone(),
+            triangle_count: rest.index_count / 3,
+            material: self.materials.get(material)?.group.clone(),
+            world_from_object: drawable.world_from_object,
+            bounds_in_world: drawable.bounds_in_world,
+        })
+    }
 }

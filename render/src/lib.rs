@@ -12,6 +12,7 @@ mod cache;
 mod clock;
 mod contours;
 mod cull;
+mod cutouts;
 mod deform;
 mod draws;
 mod error;

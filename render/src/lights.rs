@@ -1,6 +1,6 @@
 //! The lights of a frame in the order in which the passes take them.
 
-use crate::uniforms;
+use crate::{soft, uniforms};
 use glam::Vec3;
 use umbriel_scene::{Light, LightKind, MapFilter, Scene, ShadowMethod, StencilMode};
 
@@ -39,20 +39,27 @@ impl Lights {
     }
 }
 
-/// Does a light draw maps: for shapes in general, or for those that list it? Volumes leave to maps what has holes.
+/// Does a light draw maps: for shapes in general, or for those that list it? Volumes may leave to maps what has holes.
 pub(crate) fn draws_map(scene: &Scene, light: usize, any_caster_has_holes: bool) -> bool {
     let is_listed = || scene.receive_lists.iter().any(|list| list.contains(&light));
     is_sound(&scene.lights[light])
         && match scene.lights[light].shadows {
             ShadowMethod::Map => true,
             ShadowMethod::None => is_listed(),
-            ShadowMethod::Volume => any_caster_has_holes && scene.lights[light].shines,
+            ShadowMethod::Volume => {
+                any_caster_has_holes && scene.lights[light].shines && leaves_holes_to_maps(&scene.lights[light])
+            }
         }
 }
 
 /// Are a light's maps of casters with holes alone?
 pub(crate) fn maps_holes_only(light: &Light) -> bool {
     light.shadows == ShadowMethod::Volume
+}
+
+/// Do the volumes of a light leave to maps what has holes: by choice, or because outlines of holes have penumbrae by maps alone?
+pub(crate) fn leaves_holes_to_maps(light: &Light) -> bool {
+    light.shadows == ShadowMethod::Volume && (light.volume.holes_by_map || soft::size_of(light) > 0.0)
 }
 
 /// Does the shadow of a light fall on a drawable?
@@ -108,7 +115,7 @@ pub(crate) fn uniform_of(light: &Light, faces: (u32, u32)) -> uniforms::Light {
     }
 }
 
-/// Where volumes are soft, so is what they leave to maps.
+/// What soft volumes leave to maps is as soft.
 fn filter_of(light: &Light) -> MapFilter {
     if maps_holes_only(light) && light.soft { MapFilter::Pcss } else { light.map.filter }
 }

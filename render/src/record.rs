@@ -3,6 +3,7 @@
 use crate::cache::{GpuMaterial, GpuMesh, Slab};
 use crate::clock::Clock;
 use crate::contours::Contours;
+use crate::cutouts::Cutouts;
 use crate::deform::Deformer;
 use crate::draws::{Batch, Draw, Kind};
 use crate::maps::Maps;
@@ -93,6 +94,7 @@ pub(crate) struct Recorder<'a> {
     pub(crate) screen: &'a Screen,
     pub(crate) device: &'a wgpu::Device,
     pub(crate) volumes: &'a VolumePass,
+    pub(crate) cutouts: &'a Cutouts,
     pub(crate) soft: &'a SoftPass,
     pub(crate) contours: &'a Contours,
     pub(crate) views: &'a Slots<uniforms::View>,
@@ -120,21 +122,38 @@ impl Recorder<'_> {
         {
             return self.soft_view(encoder, view, to);
         }
-        let mut pass = begin_part(encoder, self.clock, "views", to, Part { is_first: true, is_last: true, keeps_stencil: false });
+        let reads_depth = self.seen_depth(views, to).is_some();
+        let part = |is_first, is_last| Part { is_first, is_last, keeps_stencil: false };
+        let mut pass = begin_part(encoder, self.clock, "views", to, part(true, !reads_depth));
+        if reads_depth {
+            for view in views {
+                enter(&mut pass, view);
+                self.depth_and_base(&mut pass, view);
+            }
+            drop(pass);
+            copy_depth(encoder, to);
+            pass = begin_part(encoder, self.clock, "shadow volumes", to, part(false, true));
+        }
         for view in views {
-            let ([left, top], [width, height]) = (view.origin, view.size);
-            pass.set_viewport(left as f32, top as f32, width as f32, height as f32, 0.0, 1.0);
-            pass.set_scissor_rect(left, top, width, height);
-            self.depth_and_base(&mut pass, view);
+            enter(&mut pass, view);
+            if !reads_depth {
+                self.depth_and_base(&mut pass, view);
+            }
             for (number, step) in view.steps.iter().enumerate() {
                 if number > 0 {
                     pass.set_stencil_reference(0);
                     fill_stencil(&mut pass, self.screen, self.films.group(BLACK_FILM));
                 }
-                self.hard_step(&mut pass, view, step, number == 0);
+                self.hard_step(&mut pass, (view, to), step, number == 0);
             }
             self.blend(&mut pass, view);
         }
+    }
+
+    /// Where depth is copied to, if a step of these views reads it.
+    fn seen_depth<'t>(&self, views: &[ViewPlan], to: &'t ViewTarget) -> Option<&'t wgpu::TextureView> {
+        let has_cutouts = views.iter().flat_map(|view| &view.steps).any(|step| self.cutouts.any(step.job));
+        to.seen_depth.as_ref().filter(|_| has_cutouts)
     }
 
     /// One view with soft shadows, which read in a pass what one before it counted.
@@ -142,6 +161,12 @@ impl Recorder<'_> {
         let part = |is_last| Part { is_first: false, is_last, keeps_stencil: false };
         let mut pass = begin_part(encoder, self.clock, "surfaces", to, Part { is_first: true, ..part(false) });
         self.depth_and_base(&mut pass, view);
+        let reads_depth = self.seen_depth(std::slice::from_ref(view), to).is_some();
+        if reads_depth {
+            drop(pass);
+            copy_depth(encoder, to);
+            pass = begin_part(encoder, self.clock, "shadow volumes", to, part(false));
+        }
         for (number, step) in view.steps.iter().enumerate() {
             let is_last = number + 1 == view.steps.len();
             if let (Some(layers), Some(soft)) = (&step.soft, &to.soft) {
@@ -149,12 +174,12 @@ impl Recorder<'_> {
                 pass = self.soft_step(encoder, view, (step, layers), (to, soft), part(is_last));
                 continue;
             }
-            // The stencil starts empty, so the first volumes may be counted in the pass that filled depth.
+            // The stencil starts empty, so the first volumes may be counted in the pass that is open.
             if number > 0 {
                 drop(pass);
                 pass = begin_part(encoder, self.clock, "shadow volumes", to, part(is_last));
             }
-            self.hard_step(&mut pass, view, step, number == 0);
+            self.hard_step(&mut pass, (view, to), step, number == 0);
         }
         self.blend(&mut pass, view);
     }
@@ -171,8 +196,8 @@ impl Recorder<'_> {
     }
 
     /// Counts volumes into the empty stencil and uses the counts.
-    fn hard_step(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, step: &Step, is_first: bool) {
-        let is_counted = self.count(pass, view, (step.job, &step.exempt));
+    fn hard_step(&mut self, pass: &mut wgpu::RenderPass<'_>, (view, to): (&ViewPlan, &ViewTarget), step: &Step, is_first: bool) {
+        let is_counted = self.count(pass, (view, to), (step.job, &step.exempt));
         let shades = is_first && view.lit_slot.is_some();
         if shades {
             self.shade_once(pass, view, is_counted);
@@ -196,11 +221,22 @@ impl Recorder<'_> {
     }
 
     /// Counts the volumes of a job, and forgets them where shapes receive no shadow. False where there is none to count.
-    fn count(&mut self, pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan, (job, exempt): (usize, &[Draw])) -> bool {
+    fn count(
+        &mut self,
+        pass: &mut wgpu::RenderPass<'_>,
+        (view, to): (&ViewPlan, &ViewTarget),
+        (job, exempt): (usize, &[Draw]),
+    ) -> bool {
         let drawn = self.volumes.draw(pass, job, self.views.group(view.base_slot), &view.sight);
-        let is_counted = drawn.z_pass + drawn.z_fail > 0;
+        let mut is_counted = drawn.z_pass + drawn.z_fail > 0;
         self.stats.volumes.add(&drawn);
         pass.set_stencil_reference(0);
+        if let Some(depth) = to.seen_depth.as_ref().filter(|_| self.cutouts.any(job)) {
+            let group = self.cutouts.view_group(self.device, self.views.binding(view.base_slot), depth);
+            let drawn = self.cutouts.draw(pass, job, &group, &view.sight);
+            is_counted |= drawn > 0;
+            self.stats.cutouts += drawn;
+        }
         pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
         self.surfaces(pass, exempt, Pass::Exempt);
         is_counted
@@ -248,7 +284,7 @@ impl Recorder<'_> {
         for (number, &job) in layers.iter().enumerate() {
             let part = Part { is_last: false, keeps_stencil: true, ..last };
             let mut pass = begin_part(encoder, self.clock, "shadow volumes", to, part);
-            self.count(&mut pass, view, (job, &step.exempt));
+            self.count(&mut pass, (view, to), (job, &step.exempt));
             drop(pass);
             self.soft.draw(self.device, encoder, self.clock, (job, self.views.group(view.base_slot)), (soft, number == 0));
         }
@@ -327,6 +363,21 @@ fn fill_stencil(pass: &mut wgpu::RenderPass<'_>, screen: &Screen, any_film: &wgp
     pass.set_pipeline(&screen.fill_stencil);
     pass.set_bind_group(1, any_film, &[]);
     pass.draw(0..3, 0..1);
+}
+
+/// What follows is drawn where the view lies in its sheet.
+fn enter(pass: &mut wgpu::RenderPass<'_>, view: &ViewPlan) {
+    let ([left, top], [width, height]) = (view.origin, view.size);
+    pass.set_viewport(left as f32, top as f32, width as f32, height as f32, 0.0, 1.0);
+    pass.set_scissor_rect(left, top, width, height);
+}
+
+/// Copies depth to where later passes read it while they test against it.
+fn copy_depth(encoder: &mut wgpu::CommandEncoder, to: &ViewTarget) {
+    if let Some(copy) = &to.seen_depth {
+        let (from, copy) = (to.depth.texture(), copy.texture());
+        encoder.copy_texture_to_texture(from.as_image_copy(), copy.as_image_copy(), from.size());
+    }
 }
 
 /// Place of a pass among those of a sheet.

@@ -3,8 +3,10 @@
 use crate::cache::{GpuMaterial, GpuMesh, MaterialCache, Slab, make_mesh};
 use crate::clock::Clock;
 use crate::contours::Contours;
+use crate::cutouts::Cutouts;
 use crate::deform::Deformer;
 use crate::draws::{Caches, Draw, Draws};
+use crate::jobs::Jobs;
 use crate::layouts::Layouts;
 use crate::lighting::Lighting;
 use crate::lights::{self, Lights, draws_map};
@@ -20,7 +22,7 @@ use crate::soft::{self, SoftJob, SoftPass};
 use crate::stats::{FrameStats, Problems};
 use crate::surface::{FrameNeeds, Pass, Surface};
 use crate::targets::{Target, ViewTargets};
-use crate::volumes::{Depth, VolumeJob, VolumePass};
+use crate::volumes::{Depth, VolumePass};
 use crate::{Error, Gpu, buffer::GrowBuffer, gpu, jobs, surroundings, uniforms};
 use glam::Vec3;
 use std::time::Instant;
@@ -37,6 +39,7 @@ pub struct Renderer {
     screen: Screen,
     maps: Maps,
     volumes: VolumePass,
+    cutouts: Cutouts,
     soft: SoftPass,
     contours: Contours,
     deformer: Deformer,
@@ -78,6 +81,7 @@ impl Renderer {
             screen,
             maps,
             volumes,
+            cutouts: Cutouts::new(device, &layouts.material, samples),
             soft: SoftPass::new(device, &layouts, samples),
             contours: Contours::new(device, &layouts, samples),
             deformer: Deformer::new(device),
@@ -131,9 +135,11 @@ impl Renderer {
         self.take_drawables(scene);
         let lights = Lights::new(scene);
         let casters = self.choose_maps(scene, all);
-        let (mut jobs, purposes) =
-            jobs::jobs(scene, &lights, &self.draws, &self.meshes, &self.deformer, &mut self.films, &mut self.problems);
-        let soft = soft::soft_jobs(scene, &lights, &purposes, &mut jobs);
+        let things =
+            jobs::Things { draws: &self.draws, meshes: &self.meshes, materials: &self.materials, deformer: &self.deformer };
+        let mut jobs = jobs::jobs(scene, &lights, &things, &mut self.films, &mut self.problems);
+        let soft = soft::soft_jobs(scene, &lights, &jobs.purposes, &mut jobs.volumes);
+        self.cutouts.prepare(&self.gpu.device, &self.gpu.queue, &jobs.cutouts);
         let seen = (&self.draws, &self.meshes, &self.deformer);
         self.contours.prepare((&self.gpu.device, &self.gpu.queue), scene, seen, &mut self.volumes);
         let contours = self.contours.places();
@@ -149,7 +155,7 @@ impl Renderer {
             scene,
             lights: &lights,
             light_uniforms: &light_uniforms,
-            purposes: &purposes,
+            purposes: &jobs.purposes,
             soft: &soft,
             contours: &contours,
             bounds_depth: self.gpu.info.device_type == wgpu::DeviceType::Cpu,
@@ -164,7 +170,7 @@ impl Renderer {
         self.drop_unused();
         stats.maps = self.maps.faces.len() as u32;
         stats.map_shares.clone_from(&self.maps.shares);
-        stats.volume_jobs = purposes.len() as u32;
+        stats.volume_jobs = jobs.purposes.len() as u32;
         stats.prepare_s = (prepared - start).as_secs_f64();
         stats.encode_s = prepared.elapsed().as_secs_f64();
         Ok(stats)
@@ -180,6 +186,7 @@ impl Renderer {
         self.surface.set_samples(samples);
         self.screen = Screen::new(device, &self.layouts, samples);
         self.volumes = volume_pass(device, &self.layouts, samples);
+        self.cutouts = Cutouts::new(device, &self.layouts.material, samples);
         self.soft = SoftPass::new(device, &self.layouts, samples);
         self.contours = Contours::new(device, &self.layouts, samples);
         self.view_targets = ViewTargets::default();
@@ -298,10 +305,13 @@ impl Renderer {
             }
         }
         self.surface.make_wanted(device);
-        let mut rest = plans.iter();
+        let mut rest = &plans[..];
         for sheet in &sheets.0 {
-            let is_soft = rest.by_ref().take(sheet.views).flat_map(|view: &ViewPlan| &view.steps).any(|s| s.soft.is_some());
-            self.view_targets.make(device, &self.layouts.picture, sheet.size, (self.samples, is_soft), self.frame);
+            let (views, others) = rest.split_at(sheet.views);
+            rest = others;
+            let steps = || views.iter().flat_map(|view: &ViewPlan| &view.steps);
+            let needs = (steps().any(|s| s.soft.is_some()), steps().any(|s| self.cutouts.any(s.job)));
+            self.view_targets.make(device, &self.layouts.picture, sheet.size, self.samples, needs, self.frame);
         }
         (plans, sheets)
     }
@@ -320,16 +330,16 @@ impl Renderer {
     fn record(
         &mut self,
         (plans, sheets): (&[ViewPlan], &Sheets),
-        (jobs, soft): (&[VolumeJob], &[Option<SoftJob>]),
+        (jobs, soft): (&Jobs, &[Option<SoftJob>]),
         stats: &mut FrameStats,
     ) {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         stats.deformed = self.deformer.run(&mut encoder, &self.clock);
-        stats.volumes_made = self.volumes.prepare(device, &mut encoder, jobs);
+        stats.volumes_made = self.volumes.prepare(device, &mut encoder, &jobs.volumes);
         self.volumes.problems().into_iter().for_each(|message| self.problems.report(message));
         let report = |message| self.problems.report(message);
-        self.soft.prepare((device, queue), &mut encoder, &mut self.volumes, (jobs, soft), report);
+        self.soft.prepare((device, queue), &mut encoder, &mut self.volumes, (&jobs.volumes, soft), report);
         let drawer = Drawer {
             meshes: &self.meshes,
             materials: &self.materials,
@@ -344,6 +354,7 @@ impl Renderer {
             screen: &self.screen,
             device,
             volumes: &self.volumes,
+            cutouts: &self.cutouts,
             soft: &self.soft,
             contours: &self.contours,
             views: &self.views,

@@ -32,6 +32,8 @@ pub struct FrameStats {
     pub volumes_made: VolumeStats,
     /// How they were drawn, summed over views.
     pub volumes: VolumeDraws,
+    /// Shapes whose holes shadow volumes kept, summed over views.
+    pub cutouts: u32,
     /// CPU time until everything is sent to the GPU, seconds.
     pub prepare_s: f64,
     /// CPU time of recording and submitting, seconds.

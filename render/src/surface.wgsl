@@ -265,7 +265,9 @@ fn added_in_shadow(f: Fragment, @builtin(sample_mask) covered: u32) -> @location
 // Share of one light that a map lets through. Cone, distance and orientation do not count.
 fn share_through_map(f: Fragment, covered: u32) -> vec4<f32> {
     let s = place(f, covered);
-    if material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff {
+    // A picture that measures: holes are where rays find them, whatever smaller pictures of them show from afar.
+    let alpha = select(s.base_color.a, full_size_alpha(f.uv0, f.uv1, f.color.a), material.layer_count == 0u);
+    if material.alpha_mode == MASK && alpha < material.alpha_cutoff {
         discard;
     }
     // Light that is added outside of its shadow volumes starts from black.

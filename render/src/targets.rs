@@ -87,6 +87,8 @@ pub(crate) struct ViewTarget {
     samples: Option<wgpu::TextureView>,
     pub(crate) resolved: wgpu::TextureView,
     pub(crate) depth: wgpu::TextureView,
+    /// A copy of `depth`, made when the first cut-out needs it.
+    pub(crate) seen_depth: Option<wgpu::TextureView>,
     /// Made when the first soft shadow needs it.
     pub(crate) soft: Option<SoftTarget>,
     /// Group 1 of the pass that reads `resolved`.
@@ -106,6 +108,21 @@ impl ViewTarget {
     }
 }
 
+/// What depth is copied into, to be read sample by sample.
+fn copy_of(device: &wgpu::Device, depth: &wgpu::Texture) -> wgpu::TextureView {
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("seen depth"),
+        size: depth.size(),
+        mip_level_count: 1,
+        sample_count: depth.sample_count(),
+        dimension: depth.dimension(),
+        format: depth.format(),
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor { aspect: wgpu::TextureAspect::DepthOnly, ..Default::default() })
+}
+
 /// View targets by size.
 #[derive(Default)]
 pub(crate) struct ViewTargets(HashMap<[u32; 2], ViewTarget>);
@@ -116,7 +133,8 @@ impl ViewTargets {
         device: &wgpu::Device,
         picture_layout: &wgpu::BindGroupLayout,
         size: [u32; 2],
-        (samples, is_soft): (Samples, bool),
+        samples: Samples,
+        (is_soft, has_cutouts): (bool, bool),
         frame: u64,
     ) {
         let target = self.0.entry(size).or_insert_with(|| {
@@ -139,7 +157,13 @@ impl ViewTargets {
                 samples: (samples != Samples::One).then(|| view("samples", LINEAR_FORMAT, samples.count(), none)),
                 group: picture_group(device, picture_layout, &resolved),
                 resolved,
-                depth: view("depth", DEPTH_FORMAT, samples.count(), wgpu::TextureUsages::TEXTURE_BINDING),
+                depth: view(
+                    "depth",
+                    DEPTH_FORMAT,
+                    samples.count(),
+                    wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+                ),
+                seen_depth: None,
                 soft: None,
                 last_used: frame,
             }
@@ -147,6 +171,9 @@ impl ViewTargets {
         target.last_used = frame;
         if is_soft && target.soft.is_none() {
             target.soft = Some(SoftTarget::new(device, target.depth.texture()));
+        }
+        if has_cutouts && target.seen_depth.is_none() {
+            target.seen_depth = Some(copy_of(device, target.depth.texture()));
         }
     }
 

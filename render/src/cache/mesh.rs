@@ -11,7 +11,7 @@ pub(crate) struct GpuMesh {
     pub(crate) positions: wgpu::Buffer,
     /// Normal and tangent per vertex: seven numbers.
     pub(crate) frames: wgpu::Buffer,
-    /// Both texture coordinates and the colour per vertex: eight numbers.
+    /// Both texture coordinates and the colour per vertex: eight numbers; storage for what looks up the alpha where a ray passes.
     pub(crate) attributes: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,
     pub(crate) index_count: u32,
@@ -84,7 +84,7 @@ pub(crate) fn make_mesh(device: &wgpu::Device, mesh: &Mesh) -> Result<GpuMesh, S
     Ok(GpuMesh {
         positions: bound("positions", bytemuck::cast_slice(&mesh.positions), shared),
         frames: bound("frames", bytemuck::cast_slice(&frames), shared),
-        attributes: bound("attributes", bytemuck::cast_slice(&attributes), BufferUsages::VERTEX),
+        attributes: bound("attributes", bytemuck::cast_slice(&attributes), shared),
         indices: bound("indices", bytemuck::cast_slice(&mesh.indices), BufferUsages::INDEX | BufferUsages::STORAGE),
         index_count: mesh.indices.len() as u32,
         vertex_count: count as u32,

@@ -490,6 +490,11 @@ impl Draws {
         })
     }
 
+    /// Material of a drawn drawable that alpha cuts holes into.
+    pub(crate) fn holed_by(&self, index: usize) -> Option<u32> {
+        self.slots.get(index).filter(|s| s.drawn && s.has_holes).map(|s| s.material)
+    }
+
     /// Mesh of a drawn drawable, and its place in the list of deformed ones.
     pub(crate) fn mesh_of(&self, index: usize) -> Option<(u32, Option<u32>)> {
         self.slots.get(index).filter(|s| s.drawn).map(|s| (s.mesh, s.deformed))

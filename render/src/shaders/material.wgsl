@@ -87,6 +87,15 @@ fn texture_place(slot: u32, uv0: vec2<f32>, uv1: vec2<f32>) -> vec2<f32> {
     return t.linear.xy * uv.x + t.linear.zw * uv.y + t.offset;
 }
 
+// Alpha with texture and vertex colour, from the picture at its full size.
+fn full_size_alpha(uv0: vec2<f32>, uv1: vec2<f32>, vertex_alpha: f32) -> f32 {
+    var alpha = material.base_color.a * vertex_alpha;
+    if has_texture(0u) {
+        alpha *= textureSampleLevel(base_color_texture, base_color_sampler, texture_place(0u, uv0, uv1), 0.0).a;
+    }
+    return alpha;
+}
+
 // Linear RGBA with texture and vertex colour.
 fn base_color_at(uv0: vec2<f32>, uv1: vec2<f32>, vertex_color: vec4<f32>) -> vec4<f32> {
     var color = material.base_color * vertex_color;

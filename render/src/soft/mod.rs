@@ -63,7 +63,7 @@ pub(crate) fn is_soft(light: &Light) -> bool {
 }
 
 /// Size of the source as penumbrae see it.
-fn size_of(light: &Light) -> f32 {
+pub(crate) fn size_of(light: &Light) -> f32 {
     if light.soft && light.size.is_finite() { light.size.max(0.0) } else { 0.0 }
 }
 

@@ -176,7 +176,7 @@ impl Drawing {
     pub(super) fn run(&self, pass: &mut wgpu::RenderPass<'_>, shown: &[(&Lists, Choice)], sight: &Sight, view: &wgpu::BindGroup) {
         pass.set_bind_group(0, view, &[]);
         let total: u32 = shown.iter().map(|(l, _)| l.part.layers.min(STENCIL_LAYERS)).sum();
-        let whole = in_target(sight, sight.whole());
+        let whole = sight.in_target();
         let mut scissor = [0; 4];
         cut(pass, &mut scissor, whole);
         if total <= STENCIL_LAYERS {
@@ -226,7 +226,7 @@ impl Drawing {
             }
             if bound.replace(place) != Some(place) {
                 pass.set_bind_group(1, &lists.placed, &[]);
-                cut(pass, scissor, in_target(sight, choice.scissor));
+                cut(pass, scissor, sight.placed(choice.scissor));
                 if let Some(listed) = &lists.listed {
                     pass.set_index_buffer(listed.indices.slice(..), wgpu::IndexFormat::Uint32);
                 }
@@ -246,11 +246,6 @@ impl Kind {
         let on_surface = matches!(piece, Piece::NearCaps | Piece::TurnedCaps | Piece::SolidCaps);
         Kind { grouped, quads, z_fail, turned: piece == Piece::TurnedCaps, on_surface }
     }
-}
-
-/// A rectangle of a view in the view's target.
-fn in_target(sight: &Sight, [left, top, width, height]: [u32; 4]) -> [u32; 4] {
-    [left + sight.origin[0], top + sight.origin[1], width, height]
 }
 
 fn cut(pass: &mut wgpu::RenderPass<'_>, now: &mut [u32; 4], to: [u32; 4]) {

@@ -13,13 +13,14 @@
 //! exact, and so is a surface that lies over itself more often, which is cut apart. What remains is a mesh of more than 8128
 //! layers, see [`VolumeStats::may_wrap`].
 //!
-//! Casters throw the shadow of their whole triangles. Those that alpha cuts holes into are left to maps where a light casts by volume.
+//! Casters throw the shadow of their whole triangles. Those that alpha cuts holes into are drawn by `cutouts`.
 //!
 //! This module knows nothing of lighting, materials or how the stencil is used afterwards.
 
 mod cache;
 mod choose;
 mod draw;
+mod extent;
 mod extract;
 mod hull;
 mod layers;
@@ -29,6 +30,7 @@ mod tiles;
 
 pub(crate) use cache::GpuPart;
 pub use choose::Sight;
+pub(crate) use extent::Extent;
 pub(crate) use extract::CasterUniform;
 pub use tiles::Seen;
 

@@ -3,6 +3,7 @@
 mod author;
 mod contact;
 mod contours;
+mod cutouts;
 mod deformation;
 mod device;
 mod layouts;

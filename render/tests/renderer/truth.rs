@@ -210,10 +210,11 @@ fn bias_tunes_itself() {
     assert!(failed.is_empty(), "{failed:?}");
 }
 
-/// Lights that cast by volume draw maps of what alpha cuts holes into, and of nothing else.
+/// Lights that cast by volume draw maps of what alpha cuts holes into where they are told to, and of nothing else.
 #[test]
 fn holes_are_left_to_maps() {
-    let by_volume = |light: Light| Light { shadows: ShadowMethod::Volume, ..light };
+    let volume = VolumeSettings { holes_by_map: true, ..Default::default() };
+    let by_volume = |light: Light| Light { shadows: ShadowMethod::Volume, volume, ..light };
     let lights = [
         ("sun", by_volume(sun(Vec3::new(0.4, -1.0, -0.3)))),
         ("bulb", by_volume(Light { kind: LightKind::Point, position: Vec3::new(1.0, 5.0, 1.5), ..noon() })),
@@ -243,6 +244,9 @@ fn holes_are_left_to_maps() {
             std::sync::Arc::make_mut(&mut d.material).base_color_texture = None;
         }
         assert_eq!(redraws(&scene), (false, false), "{name}: without holes");
+        let mut scene = Scene { drawables: forest().into(), lights: scene.lights, ..Default::default() };
+        scene.lights[0].volume.holes_by_map = false;
+        assert_eq!(redraws(&scene), (false, false), "{name}: by rays");
     }
 }
 

@@ -2,8 +2,8 @@
 
 use glam::Vec4;
 
-/// Settings of stencil shadow volumes. None of them changes what is in shadow, but for `length` and `lower_plane`; they say
-/// how it is found, so that each can be measured against the others.
+/// Settings of stencil shadow volumes. None of them changes what is in shadow, but for `length`, `lower_plane` and, within the
+/// texels of a map, `holes_by_map`; they say how it is found, so that each can be measured against the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeSettings {
     /// Where volumes are counted.
@@ -23,6 +23,9 @@ pub struct VolumeSettings {
     /// Nothing is seen below this plane, such as the surface of the sea: (normal, distance) with `normal . p + distance < 0`
     /// below.
     pub lower_plane: Option<Vec4>,
+    /// What alpha cuts holes into casts by a map of the light instead of by rays through its texture, as it does wherever volumes
+    /// have penumbrae.
+    pub holes_by_map: bool,
 }
 
 /// Where shadow volumes are counted (000 section 3.2, 001 section 5.1).
@@ -55,6 +58,7 @@ impl Default for VolumeSettings {
             fitted: true,
             length: f32::INFINITY,
             lower_plane: None,
+            holes_by_map: false,
         }
     }
 }

@@ -151,6 +151,7 @@ fn volume_settings(read: &Reader<'_>, check: &mut Check<'_>) -> VolumeSettings {
         fitted: read.get("volume_fitted"),
         length: check.finite("volume_length", read.get("volume_length"), f32::INFINITY, |l: &f32| *l > 0.0),
         lower_plane: floor.is_finite().then(|| Vec3::Y.extend(-floor)),
+        holes_by_map: read.choice("volume_holes") == 1,
     }
 }
 

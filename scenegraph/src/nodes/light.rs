@@ -54,6 +54,10 @@ fn common(intensity: f32, unit: &'static str) -> Vec<Field> {
         Field::new("volume_floor", f32::NEG_INFINITY)
             .unit("m")
             .doc("Height below which nothing is seen, such as that of the sea; volumes end there."),
+        Field::choice("volume_holes", &["rays", "map"], "rays").doc(
+            "How leaves and fences that alpha cuts out cast by volume: exactly, by a ray through their texture for each sample, or by a \
+             map of them alone. Soft volumes take the map.",
+        ),
         Field::node("default_shadow_map")
             .doc("A GeneratedShadowMap whose size, update, scale and bias the light's map takes (003 section 4.3)."),
         Field::choice("filter", &["none", "hardware", "pcf4", "pcf16", "poisson", "pcss"], "pcf16")

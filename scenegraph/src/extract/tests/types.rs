@@ -243,6 +243,7 @@ fn settings_of_volumes_are_read_and_follow_the_room() {
     w.set(light, "volume_depth_bounds", false);
     w.set(light, "volume_length", 3.0f32);
     w.set(light, "volume_floor", -1.0f32);
+    w.set(light, "volume_holes", "map");
     w.update();
     assert!(w.problems().is_empty());
     let expected = VolumeSettings {
@@ -253,6 +254,7 @@ fn settings_of_volumes_are_read_and_follow_the_room() {
         fitted: false,
         length: 6.0,
         lower_plane: Some(Vec4::new(0.0, 1.0, 0.0, -3.0)),
+        holes_by_map: true,
     };
     assert_eq!(w.light(light).volume, expected);
     w.set(light, "volume_length", -1.0f32);

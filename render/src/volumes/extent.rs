@@ -1,0 +1,48 @@
+//! Where the shadow of a caster is looked for, for passes that find it in a way of their own.
+
+use super::choose::{Sight, Watch};
+use super::reach::{self, Reach};
+use super::{Surface, VolumeLight};
+use umbriel_scene::Aabb;
+
+/// How far a caster's shadow may fall.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extent {
+    bounds: Aabb,
+    reach: Reach,
+}
+
+impl Extent {
+    /// `None` where it falls on nothing that receives.
+    pub(crate) fn new(light: &VolumeLight, bounds_in_world: &Aabb, receivers: &Aabb) -> Option<Extent> {
+        let reach = reach::reach(light, bounds_in_world, receivers)?;
+        Some(Extent { bounds: *bounds_in_world, reach })
+    }
+
+    /// 1 / how far it is thrown, as in volumes/silhouette.wgsl.
+    pub(crate) fn w(&self) -> f32 {
+        self.reach.w()
+    }
+}
+
+impl Sight {
+    /// Left, top, width and height, in the target, of what each of these may darken in the view; `None` for nothing.
+    pub(crate) fn pixels_of<'a>(
+        &'a self,
+        light: &'a VolumeLight,
+        extents: impl Iterator<Item = &'a Extent>,
+    ) -> impl Iterator<Item = Option<[u32; 4]>> {
+        let watch = Watch::new(self, light);
+        extents.map(move |e| watch.choose(&e.bounds, Surface::InParts, &e.reach).map(|choice| self.placed(choice.scissor)))
+    }
+
+    /// The whole view in its target.
+    pub(crate) fn in_target(&self) -> [u32; 4] {
+        self.placed(self.whole())
+    }
+
+    /// A rectangle of the view in its target.
+    pub(super) fn placed(&self, [left, top, width, height]: [u32; 4]) -> [u32; 4] {
+        [left + self.origin[0], top + self.origin[1], width, height]
+    }
+}
