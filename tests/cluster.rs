@@ -52,3 +52,31 @@ fn a_display_that_stood_still_comes_back_into_the_lock() {
     }
     assert!(run.ok, "{text}");
 }
+
+/// A display with a slash in its name, which the world takes away in its fifth frame and makes anew in its tenth.
+const COMES_AND_GOES: &str = r#"
+world.add(shape(make("Sphere")));
+let user = make("User", #{ position: vec3(0, 1.7, 2) });
+let front = make("Screen", #{ lower_left: vec3(-2, 0, 0), lower_right: vec3(2, 0, 0), upper_left: vec3(-2, 2.5, 0) });
+let state = make("Group", #{ name: "state" });
+state.add_field("frame", 0);
+make("Display", #{ name: "wand/1 süd", user: user, screens: [front], size: vec2(1, 1) });
+make("Display", #{ name: "wand/1", user: user, screens: [front], size: vec2(64, 40), stereo: true, layout: "side_by_side" });
+on_frame(|t, dt| {
+    state.frame += 1;
+    if state.frame == 5 { delete(find("wand/1")); }
+    if state.frame == 10 { make("Display", #{ name: "wand/1", user: user, screens: [front], size: vec2(64, 40) }); }
+});
+"#;
+
+#[test]
+fn a_display_that_the_world_takes_away_waits_until_it_is_there_again() {
+    let path = world().with_file_name("comes_and_goes.rhai");
+    std::fs::write(&path, COMES_AND_GOES).expect("a world can be written");
+    let run = umbriel(&["cluster", path.to_str().unwrap(), "--frames", "20"]);
+    let text = format!("{}{}", run.stdout, run.stderr);
+    for part in ["the last picture of `wand/1` stays until it is there again", "wand/1: shown=19", "wand/1 süd: shown=19"] {
+        assert!(text.contains(part), "{part:?} is missing in:\n{text}");
+    }
+    assert!(run.ok, "{text}");
+}

@@ -40,8 +40,8 @@ pub(crate) enum ScreenError {
     Write(#[from] png::WriteError),
 }
 
-/// Splits `wall/2` into the display and its channel. A display whose own name has a slash is taken as it is.
-pub(super) fn channel_of(show: &str) -> (&str, Option<usize>) {
+/// Splits `wall/2` into the display and its channel.
+fn channel_of(show: &str) -> (&str, Option<usize>) {
     match show.rsplit_once('/').map(|(name, channel)| (name, channel.parse())) {
         Some((name, Ok(channel))) => (name, Some(channel)),
         _ => (show, None),
@@ -57,6 +57,12 @@ pub(super) fn channel(picture: &Picture, channel: usize) -> Option<Picture> {
 /// One display, or one channel of it, in a replica.
 pub(super) struct Sight {
     show: String,
+    /// There is something of this very name: a slash in it means nothing.
+    is_whole: bool,
+    /// It was there before.
+    was_seen: bool,
+    /// It was told that it is not there now.
+    is_missed: bool,
     extractor: Extractor,
     scene: Scene,
     pointers: Pointers,
@@ -75,6 +81,9 @@ impl Sight {
     pub(super) fn new(show: &str) -> Sight {
         Sight {
             show: show.into(),
+            is_whole: false,
+            was_seen: false,
+            is_missed: false,
             extractor: Extractor::new(),
             scene: Scene::default(),
             pointers: Pointers::default(),
@@ -84,8 +93,30 @@ impl Sight {
     }
 
     /// Brings the scene up to date with a graph, which is another one where `is_new`. `windows` are sizes of windows that are open, by
-    /// the names of their pictures.
-    pub(super) fn look(&mut self, graph: &Graph, is_new: bool, windows: &WindowSizes) -> Result<Seen, ScreenError> {
+    /// the names of their pictures. None while a display that was there is missing in the rig: its last picture stays.
+    pub(super) fn look(&mut self, graph: &Graph, is_new: bool, windows: &WindowSizes) -> Result<Option<Seen>, ScreenError> {
+        match self.see(graph, is_new, windows) {
+            Ok(seen) => {
+                (self.was_seen, self.is_missed) = (true, false);
+                Ok(Some(seen))
+            }
+            Err(ScreenError::Display(error @ umbriel_displays::Error::UnknownView { .. })) if self.was_seen => {
+                if !std::mem::replace(&mut self.is_missed, true) {
+                    tracing::warn!("{error}; the last picture of `{}` stays until it is there again", self.show);
+                }
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The display, and its channel if only one is shown.
+    fn name(&self) -> (&str, Option<usize>) {
+        if self.is_whole { (&self.show, None) } else { channel_of(&self.show) }
+    }
+
+    fn see(&mut self, graph: &Graph, is_new: bool, windows: &WindowSizes) -> Result<Seen, ScreenError> {
+        self.is_whole = graph.find(&self.show).is_some();
         if is_new {
             self.extractor = Extractor::new().with_ready_casters();
             self.scene = Scene::default();
@@ -99,7 +130,7 @@ impl Sight {
         }
         let bounds = bounds(&self.scene).transformed(&self.extractor.world_from_room());
         let mut pictures = self.shown(graph, &bounds, windows)?;
-        if let (_, Some(place)) = channel_of(&self.show)
+        if let (_, Some(place)) = self.name()
             && let [whole] = &pictures[..]
         {
             // What one window shows is a part of the picture that the rig makes.
@@ -127,7 +158,7 @@ impl Sight {
 
     /// The pictures of the display, whole.
     fn shown(&mut self, graph: &Graph, bounds: &Aabb, windows: &WindowSizes) -> Result<Vec<Picture>, ScreenError> {
-        let (name, _) = channel_of(&self.show);
+        let (name, _) = if self.is_whole { (&*self.show, None) } else { channel_of(&self.show) };
         let wanted = Wanted { view: Some(name), size: DESKTOP_SIZE, windows };
         let found = self.rig.pictures(graph, self.extractor.viewpoints(), bounds, &wanted)?;
         for problem in &found.problems {
@@ -142,7 +173,7 @@ impl Sight {
         let mut all = self.whole.pictures(graph, self.extractor.viewpoints(), bounds, &wanted)?.pictures;
         // A viewpoint is shown by this process alone.
         all.retain(|picture| picture.name != DESKTOP);
-        let (name, _) = channel_of(&self.show);
+        let (name, _) = self.name();
         if !all.iter().any(|picture| picture.name == name) {
             all.extend_from_slice(shown);
         }
@@ -190,7 +221,7 @@ impl Screen for Canvas {
     type Error = ScreenError;
 
     fn draw(&mut self, graph: &Graph, _frame: u64, is_new: bool) -> Result<(), ScreenError> {
-        let seen = self.sight.look(graph, is_new, &WindowSizes::new())?;
+        let Some(seen) = self.sight.look(graph, is_new, &WindowSizes::new())? else { return Ok(()) };
         self.finish()?;
         let Some((_, renderer)) = &mut self.drawing else { return Ok(()) };
         renderer.render_part(&self.sight.scene, &seen.pictures, &seen.all)?;
@@ -220,7 +251,7 @@ impl Screen for InWindow<'_, '_> {
     type Error = ScreenError;
 
     fn draw(&mut self, graph: &Graph, _frame: u64, is_new: bool) -> Result<(), ScreenError> {
-        let seen = self.sight.look(graph, is_new, &self.stage.sizes())?;
+        let Some(seen) = self.sight.look(graph, is_new, &self.stage.sizes())? else { return Ok(()) };
         self.stage.draw(&self.sight.scene, seen.pictures, Some(&seen.all))?;
         self.stage.problems().iter().for_each(|problem| tracing::warn!("{problem}"));
         Ok(self.stage.wait()?)
