@@ -2,9 +2,10 @@
 //! `-- --displays 1` for another number of them, `-- --frames 3000` for longer rows.
 //!
 //! Each frame writes translation, rotation and scale of 10 000 transforms, or of one. Displays apply and verify them, and draw nothing. The
-//! measure beside it is TCP that sends the same bytes to four processes, each of which answers with one byte.
+//! measure beside it is TCP that sends the same bytes to four processes, each of which answers with one byte. What five processes can do at all
+//! is told by bare ones: one writes the same values to arrays and their bytes to memory, four read them into arrays and hash them.
 
-use std::io::{Read, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
@@ -43,6 +44,9 @@ fn main() -> Result<(), Failure> {
     let place = |name: &str| args.iter().position(|arg| arg == name).and_then(|at| args.get(at + 1)).cloned();
     if let Some(address) = place("--raw") {
         return raw_display(&address);
+    }
+    if let Some(address) = place("--bare") {
+        return bare_display(&address, &place("--memory").unwrap_or_default());
     }
     match (place("--display"), place("--name")) {
         (Some(endpoint), Some(name)) => display(endpoint, &name, !args.iter().any(|arg| arg == OVER_NETWORK)),
@@ -88,6 +92,98 @@ fn raw_display(address: &str) -> Result<(), Failure> {
         stream.read_exact(&mut buffer)?;
         stream.write_all(&[1])?;
     }
+    Ok(())
+}
+
+/// Places in the memory of the bare application.
+const BARE_PLACES: u64 = 4;
+const BARE_FLOATS: usize = TRANSFORMS * 10;
+
+/// What the bare displays agree on.
+fn bare_hash(floats: &[f32]) -> u64 {
+    let words = floats.as_chunks::<4>().0.iter();
+    words.fold(0, |sum, [a, b, c, d]| {
+        let pair = |low: f32, high: f32| low.to_bits() as u64 | (high.to_bits() as u64) << 32;
+        let product = (pair(*a, *b) ^ 0x2d35_8dcc_aa6c_78a5) as u128 * (pair(*c, *d) ^ 0x8bb8_4b93_962e_acc9) as u128;
+        sum.wrapping_add(product as u64 ^ (product >> 64) as u64)
+    })
+}
+
+/// Reads frames out of memory into an array, and answers with the hash of what stands there.
+fn bare_display(address: &str, memory: &str) -> Result<(), Failure> {
+    let mut stream = TcpStream::connect(address)?;
+    stream.set_nodelay(true)?;
+    let mut memory = std::fs::File::open(memory)?;
+    let (mut bytes, mut floats) = (vec![0; 4 * BARE_FLOATS], vec![0.0f32; BARE_FLOATS]);
+    let mut place = [0];
+    while stream.read_exact(&mut place).is_ok() {
+        memory.seek(SeekFrom::Start(place[0] as u64 * bytes.len() as u64))?;
+        memory.read_exact(&mut bytes)?;
+        for (float, bytes) in floats.iter_mut().zip(bytes.as_chunks::<4>().0) {
+            *float = f32::from_le_bytes(*bytes);
+        }
+        stream.write_all(&bare_hash(&floats).to_le_bytes())?;
+    }
+    Ok(())
+}
+
+/// What is possible where nothing is done but that: the next frame is made while displays have this one.
+#[cfg(target_os = "linux")]
+fn bare(display_count: usize, frames: usize) -> Result<(), Failure> {
+    use std::os::fd::AsRawFd;
+    let mut memory = std::fs::File::from(rustix::fs::memfd_create("bare", rustix::fs::MemfdFlags::CLOEXEC)?);
+    let path = format!("/proc/{}/fd/{}", std::process::id(), memory.as_raw_fd());
+    let listener = TcpListener::bind("127.0.0.1:0")?;
+    let address = listener.local_addr()?.to_string();
+    let (mut children, mut streams) = (Vec::new(), Vec::new());
+    for _ in 0..display_count {
+        children.push(again(&["--bare", &address, "--memory", &path])?);
+        let (stream, _) = listener.accept()?;
+        stream.set_nodelay(true)?;
+        streams.push(stream);
+    }
+    let (mut floats, mut bytes, mut wrong) = (vec![0.0f32; BARE_FLOATS], Vec::with_capacity(4 * BARE_FLOATS), 0);
+    let mut hash = None;
+    let started = Instant::now();
+    for frame in 0..=frames {
+        let [translations, rotations, scales] = [0..3, 3..7, 7..10].map(|part| part.start * TRANSFORMS..part.end * TRANSFORMS);
+        for number in 0..TRANSFORMS {
+            let x = (frame * 31 + number) as f32 * 0.001;
+            floats[translations.clone()].as_chunks_mut().0[number] = [x, 1.0, -x];
+            floats[rotations.clone()].as_chunks_mut().0[number] = Quat::from_rotation_y(x).to_array();
+            floats[scales.clone()].as_chunks_mut().0[number] = [1.0 + x; 3];
+        }
+        bytes.clear();
+        bytes.extend(floats.iter().flat_map(|float| float.to_le_bytes()));
+        let place = frame as u64 % BARE_PLACES;
+        memory.seek(SeekFrom::Start(place * bytes.len() as u64))?;
+        memory.write_all(&bytes)?;
+        if let Some(hash) = hash.replace(bare_hash(&floats)) {
+            for stream in &mut streams {
+                let mut answer = [0; 8];
+                stream.read_exact(&mut answer)?;
+                wrong += (u64::from_le_bytes(answer) != hash) as usize;
+            }
+        }
+        if frame < frames {
+            for stream in &mut streams {
+                stream.write_all(&[place as u8])?;
+            }
+        }
+    }
+    println!(
+        "bare processes, the same values: {:.0} frames/s, {wrong} disagreed",
+        frames as f64 / started.elapsed().as_secs_f64()
+    );
+    drop(streams);
+    for mut child in children {
+        child.wait()?;
+    }
+    Ok(())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn bare(_: usize, _: usize) -> Result<(), Failure> {
     Ok(())
 }
 
@@ -155,6 +251,7 @@ fn application(display_count: usize, frames: usize) -> Result<(), Failure> {
     let rows = [fast, ("10 000 transforms at 60 Hz", TRANSFORMS, at_60_hz), ("one transform at 60 Hz", 1, at_60_hz)];
     let bytes_of_frame = cluster(display_count, true, frames, &rows)?;
     raw(bytes_of_frame, display_count, frames)?;
+    bare(display_count, frames)?;
     println!("the same over the network:");
     cluster(display_count, false, frames, &rows)?;
     raw(bytes_of_frame, display_count, frames)
