@@ -330,13 +330,13 @@ impl<T> Target<'_, T> {
         }
         self.column.revisions[at..].iter_mut().step_by(step).take(count).for_each(|revision| *revision = self.revision);
         let (node, step) = start_and_step(rows.nodes);
-        let boundary = self.boundary;
-        let logged = self.nodes[node..].iter().step_by(step).take(count).fold(true, |all, last| all & (*last > boundary));
-        if !logged {
-            let last = |node: &&u32| self.nodes[**node as usize] <= boundary;
-            self.written.extend(rows.nodes[..count].iter().filter(last));
+        let mut slot = node;
+        for revision in self.nodes[node..].iter_mut().step_by(step).take(count) {
+            if std::mem::replace(revision, self.revision) <= self.boundary {
+                self.written.push(slot as u32);
+            }
+            slot += step;
         }
-        self.nodes[node..].iter_mut().step_by(step).take(count).for_each(|last| *last = self.revision);
         share_evenly::<COUNT>(rows.numbers, index, bytes, rows.shares)
     }
 }
