@@ -104,8 +104,12 @@ fn open(instance: &wgpu::Instance, adapter: wgpu::Adapter) -> Result<Gpu, Error>
     if !missing.is_empty() {
         return Err(lacks(info.name, missing));
     }
+    let is_software = info.device_type == wgpu::DeviceType::Cpu;
+    if is_software {
+        keep_freed_memory();
+    }
     // Software waits for all of a pass to read its clock, which takes a part of the frame.
-    let clock = if info.device_type == wgpu::DeviceType::Cpu { wgpu::Features::empty() } else { wgpu::Features::TIMESTAMP_QUERY };
+    let clock = if is_software { wgpu::Features::empty() } else { wgpu::Features::TIMESTAMP_QUERY };
     let wanted = clock | wgpu::Features::DEPTH_CLIP_CONTROL;
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("umbriel"),
@@ -116,4 +120,13 @@ fn open(instance: &wgpu::Instance, adapter: wgpu::Adapter) -> Result<Gpu, Error>
     let (device, queue) =
         pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| Error::NoDevice(format!("{}: {e}", info.name)))?;
     Gpu::from_parts(instance.clone(), adapter, device, queue)
+}
+
+/// Lets the process keep memory that is freed and soon wanted again. A software device lists the triangles of every pass in
+/// memory of its own, some 10 MB of it in a frame of seven channels; given back to the system after each pass, every page of it
+/// costs a fault in the next. glibc gives back what is free beyond twice the largest block that it ever
+/// mapped on its own and was handed back, up to these 32 MiB; other allocators do not care.
+fn keep_freed_memory() {
+    const LARGEST_MAPPED: usize = 32 << 20;
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGEST_MAPPED - (64 << 10))));
 }

@@ -30,7 +30,7 @@ impl Layouts {
             *view_dimension = wgpu::TextureViewDimension::D2Array;
         }
         let lighting = [
-            buffer(0, fragment, wgpu::BufferBindingType::Uniform),
+            buffer(0, ShaderStages::VERTEX_FRAGMENT, wgpu::BufferBindingType::Uniform),
             buffer(1, fragment, read),
             buffer(2, fragment, read),
             maps,
@@ -40,6 +40,7 @@ impl Layouts {
             buffer(7, fragment, read),
         ];
         let unfiltered = wgpu::TextureSampleType::Float { filterable: false };
+        let picture = BindGroupLayoutEntry { visibility: ShaderStages::VERTEX_FRAGMENT, ..texture(0, unfiltered) };
         let uniform = wgpu::BufferBindingType::Uniform;
         Layouts {
             view: layout(device, "view", &[buffer(0, ShaderStages::VERTEX_FRAGMENT, uniform)]),
@@ -51,7 +52,7 @@ impl Layouts {
             instances: layout(device, "instances", &[buffer(0, ShaderStages::VERTEX, read)]),
             material: layout(device, "material", &material),
             lighting: layout(device, "lighting", &lighting),
-            picture: layout(device, "picture", &[texture(0, unfiltered)]),
+            picture: layout(device, "picture", &[picture]),
             film: layout(device, "film", &[buffer(0, fragment, uniform)]),
         }
     }

@@ -47,20 +47,20 @@ impl Screen {
         let stencil = wgpu::StencilState { front: in_shadow, back: in_shadow, read_mask: 0xff, write_mask: 0 };
         let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         let compose = |entry, format| {
-            MASKS.map(|mask| pipeline(device, (&compose_layout, &compose_module), entry, (format, None, mask), None))
+            MASKS.map(|mask| pipeline(device, (&compose_layout, &compose_module), ["of_view", entry], (format, None, mask), None))
         };
         Screen {
             background: pipeline(
                 device,
                 (&background_layout, &shaders::module(device, "background", &[&shaders::background()])),
-                "background",
+                ["sky", "background"],
                 (LINEAR_FORMAT, None, ColorWrites::ALL),
                 Some((samples, CompareFunction::Equal, wgpu::StencilState::default())),
             ),
             film: pipeline(
                 device,
                 (&film_layout, &shaders::module(device, "film", shaders::FILM)),
-                "tint",
+                ["fullscreen", "tint"],
                 (LINEAR_FORMAT, over, ColorWrites::ALL),
                 // Depth of the film is 0, infinitely far: it passes where there is a surface.
                 Some((samples, CompareFunction::Less, stencil)),
@@ -68,7 +68,7 @@ impl Screen {
             fill_stencil: pipeline(
                 device,
                 (&film_layout, &shaders::module(device, "fill stencil", shaders::FILM)),
-                "tint",
+                ["fullscreen", "tint"],
                 (LINEAR_FORMAT, None, ColorWrites::empty()),
                 Some((samples, CompareFunction::Always, replacing())),
             ),
@@ -84,7 +84,7 @@ impl Screen {
     pub(crate) fn blit(&mut self, device: &wgpu::Device, format: wgpu::TextureFormat) -> &wgpu::RenderPipeline {
         self.blits.entry(format).or_insert_with(|| {
             let target = (format, None, ColorWrites::ALL);
-            pipeline(device, (&self.blit_layout, &self.compose_module), "shown", target, None)
+            pipeline(device, (&self.blit_layout, &self.compose_module), ["whole", "plain"], target, None)
         })
     }
 }
@@ -92,18 +92,18 @@ impl Screen {
 fn pipeline(
     device: &wgpu::Device,
     (layout, module): (&wgpu::PipelineLayout, &wgpu::ShaderModule),
-    entry: &str,
+    [vertex, fragment]: [&str; 2],
     (format, blend, write_mask): (wgpu::TextureFormat, Option<wgpu::BlendState>, ColorWrites),
     over: Option<(Samples, CompareFunction, wgpu::StencilState)>,
 ) -> wgpu::RenderPipeline {
     let count = over.as_ref().map_or(1, |(samples, ..)| samples.count());
     let compilation_options = wgpu::PipelineCompilationOptions::default();
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(entry),
+        label: Some(fragment),
         layout: Some(layout),
         vertex: wgpu::VertexState {
             module,
-            entry_point: Some("fullscreen"),
+            entry_point: Some(vertex),
             compilation_options: compilation_options.clone(),
             buffers: &[],
         },
@@ -118,7 +118,7 @@ fn pipeline(
         multisample: wgpu::MultisampleState { count, ..Default::default() },
         fragment: Some(wgpu::FragmentState {
             module,
-            entry_point: Some(entry),
+            entry_point: Some(fragment),
             compilation_options,
             targets: &[Some(wgpu::ColorTargetState { format, blend, write_mask })],
         }),

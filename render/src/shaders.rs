@@ -43,17 +43,12 @@ pub fn surface() -> String {
     [&SURFACE_BEFORE_HOOKS.concat(), &crate::author::standard_hooks(), SURFACE_BEHIND_HOOKS].concat()
 }
 
-const BACKGROUND: &[&str] = &[
-    include_str!("shaders/view.wgsl"),
-    include_str!("shaders/light.wgsl"),
-    include_str!("shaders/fullscreen.wgsl"),
-    include_str!("background.wgsl"),
-];
+const BACKGROUND: &[&str] =
+    &[include_str!("shaders/view.wgsl"), include_str!("shaders/light.wgsl"), include_str!("background.wgsl")];
 
 pub(crate) const FILM: &[&str] = &[include_str!("shaders/fullscreen.wgsl"), include_str!("film.wgsl")];
 
-pub(crate) const COMPOSE: &[&str] =
-    &[include_str!("shaders/view.wgsl"), include_str!("shaders/fullscreen.wgsl"), include_str!("compose.wgsl")];
+pub(crate) const COMPOSE: &[&str] = &[include_str!("shaders/view.wgsl"), include_str!("compose.wgsl")];
 
 pub(crate) const MAPS: &[&str] = &[
     include_str!("shaders/position.wgsl"),
