@@ -74,6 +74,7 @@ impl Screen {
     }
 
     /// Presses and lets go a key that has this symbol of X (`XK_Escape` is 0xff1b), at a window.
+    #[cfg(feature = "cluster")]
     pub(crate) fn press(&self, window: Window, symbol: u32) {
         let setup = self.connection.setup();
         let (first, count) = (setup.min_keycode, setup.max_keycode - setup.min_keycode + 1);
