@@ -344,6 +344,12 @@ impl Follower {
             }
             Arrived::Application(false) if self.is_over => {}
             Arrived::Application(false) => {
+                for release in self.line.last_words() {
+                    self.handle(release, screen)?;
+                }
+                if self.is_over {
+                    return Ok(());
+                }
                 self.line.begin();
                 tracing::warn!("display `{}`: the application is gone; waiting for it to come back", self.name);
                 self.alone_since = Some(Instant::now());

@@ -157,6 +157,17 @@ impl<A: Send + 'static> Line<A> {
         if waited { self.arrived.try_recv().ok() } else { self.arrived.recv_timeout(patience).ok() }
     }
 
+    /// What the application said last down the short line of the subject; that it went may be known sooner.
+    pub(super) fn last_words(&mut self) -> Vec<A> {
+        let (mut words, kind) = (Vec::new(), self.subject.1);
+        self.short.drain(&self.post.bell, |word, message| {
+            if word == Word::Release {
+                words.push(kind(message.to_vec()));
+            }
+        });
+        words
+    }
+
     /// Says down the short line that a frame is drawn; false if it is to be said over the network.
     pub(super) fn say_ready(&mut self, message: &[u8]) -> bool {
         self.short.is_told() && self.short.say(Word::Ready, message)

@@ -69,9 +69,22 @@ impl Short {
     /// Waits until the bell rings or words come, which `take` gets; false at once where there is no line.
     pub(super) fn wait(&mut self, bell: &Bell, patience: Duration, mut take: impl FnMut(Word, &[u8])) -> bool {
         let Some(pipe) = &self.pipe else { return false };
-        if !bell.wait(pipe, patience) {
-            return true;
+        if bell.wait(pipe, patience) {
+            self.hear(&mut take);
         }
+        true
+    }
+
+    /// Takes the words that have come already, also those before the end of a line that is closed.
+    pub(super) fn drain(&mut self, bell: &Bell, mut take: impl FnMut(Word, &[u8])) {
+        while self.pipe.as_ref().is_some_and(|pipe| bell.wait(pipe, Duration::ZERO)) {
+            self.hear(&mut take);
+        }
+    }
+
+    /// Takes what comes next; closes the line at its end.
+    fn hear(&mut self, take: &mut impl FnMut(Word, &[u8])) {
+        let Some(pipe) = &self.pipe else { return };
         let mut is_whole = self.heard.more(pipe);
         while let Some(word) = self.heard.next() {
             match word {
@@ -85,6 +98,28 @@ impl Short {
         if !is_whole {
             self.close();
         }
-        true
+    }
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::super::near::Ear;
+    use super::*;
+
+    #[test]
+    fn last_words_are_heard_after_the_line_was_closed() {
+        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let ear = Ear::open(port).unwrap();
+        let mut short = Short::at(Some(port));
+        short.look(1, 2);
+        let application = ear.accept().unwrap();
+        let mut words = Vec::new();
+        assert!(append(&mut words, Word::Here, b"a") && append(&mut words, Word::Release, b"b"));
+        application.send(&words).unwrap();
+        application.shut();
+        let mut heard = Vec::new();
+        short.drain(&Bell::new(), |word, message| heard.push((word, message.to_vec())));
+        assert_eq!(heard, [(Word::Here, b"a".to_vec()), (Word::Release, b"b".to_vec())]);
+        assert!(!short.is_told(), "the line is closed");
     }
 }
