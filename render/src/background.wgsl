@@ -1,4 +1,4 @@
-// What is behind everything. Concatenated after shaders/{view,light}.
+// What is behind everything. Concatenated after shaders/{view,light,fullscreen}.
 
 // Whatever is the same for all pixels comes along from the corners: software devices would fetch it anew for every few of them.
 struct Sky {
@@ -12,7 +12,7 @@ struct Sky {
 
 @vertex
 fn sky(@builtin(vertex_index) index: u32) -> Sky {
-    let clip = vec4<f32>(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+    let clip = vec4<f32>(corner_of_screen(index), 0.0, 1.0);
     return Sky(clip, (view.world_from_clip * clip).xyz, frame.horizon.rgb, frame.zenith.rgb, frame.nadir.rgb);
 }
 

@@ -1,4 +1,4 @@
-// A linear picture brought to its place in the target. Concatenated after shaders/view.
+// A linear picture brought to its place in the target. Concatenated after shaders/{view,fullscreen}.
 
 @group(1) @binding(0) var picture: texture_2d<f32>;
 
@@ -16,9 +16,9 @@ struct Placed {
 
 // `window` is left, top, width and height of what is brought.
 fn placed(index: u32, window: vec4<f32>, exposure: f32) -> Placed {
-    let corner = vec2<f32>(f32(index & 1u), f32(index >> 1u)) * 2.0;
-    let at = window.xy + vec2<f32>(corner.x, 1.0 - corner.y) * window.zw;
-    return Placed(vec4<f32>(corner * 2.0 - 1.0, 0.0, 1.0), at, window.xy, window.xy + window.zw - 1.0, exposure);
+    let ndc = corner_of_screen(index);
+    let at = window.xy + (ndc * vec2<f32>(0.5, -0.5) + 0.5) * window.zw;
+    return Placed(vec4<f32>(ndc, 0.0, 1.0), at, window.xy, window.xy + window.zw - 1.0, exposure);
 }
 
 // One view of the picture.

@@ -19,6 +19,7 @@ use crate::screen::Screen;
 use crate::sheets::Sheets;
 use crate::slots::Slots;
 use crate::soft::{self, SoftJob, SoftPass};
+use crate::start::joined;
 use crate::stats::{FrameStats, Problems};
 use crate::surface::{FrameNeeds, Pass, Surface};
 use crate::targets::{Target, ViewTargets};
@@ -482,10 +483,6 @@ impl Renderer {
         }
         self.problems.drain()
     }
-}
-
-fn joined<T>(thread: std::thread::ScopedJoinHandle<'_, T>) -> T {
-    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
 fn volume_pass(device: &wgpu::Device, layouts: &Layouts, samples: Samples) -> VolumePass {

@@ -25,6 +25,7 @@ pub(crate) const SURFACE_BEFORE_HOOKS: &[&str] = &[
     include_str!("shaders/shade.wgsl"),
     include_str!("shaders/brdf.wgsl"),
     include_str!("shaders/shadow_map.wgsl"),
+    include_str!("shaders/samples.wgsl"),
     include_str!("shaders/shadow_filter.wgsl"),
     include_str!("shaders/shadow_disc.wgsl"),
     include_str!("shaders/soft_shadow.wgsl"),
@@ -43,12 +44,17 @@ pub fn surface() -> String {
     [&SURFACE_BEFORE_HOOKS.concat(), &crate::author::standard_hooks(), SURFACE_BEHIND_HOOKS].concat()
 }
 
-const BACKGROUND: &[&str] =
-    &[include_str!("shaders/view.wgsl"), include_str!("shaders/light.wgsl"), include_str!("background.wgsl")];
+const BACKGROUND: &[&str] = &[
+    include_str!("shaders/view.wgsl"),
+    include_str!("shaders/light.wgsl"),
+    include_str!("shaders/fullscreen.wgsl"),
+    include_str!("background.wgsl"),
+];
 
 pub(crate) const FILM: &[&str] = &[include_str!("shaders/fullscreen.wgsl"), include_str!("film.wgsl")];
 
-pub(crate) const COMPOSE: &[&str] = &[include_str!("shaders/view.wgsl"), include_str!("compose.wgsl")];
+pub(crate) const COMPOSE: &[&str] =
+    &[include_str!("shaders/view.wgsl"), include_str!("shaders/fullscreen.wgsl"), include_str!("compose.wgsl")];
 
 pub(crate) const MAPS: &[&str] = &[
     include_str!("shaders/position.wgsl"),

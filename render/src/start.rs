@@ -3,7 +3,7 @@
 use crate::{Error, Gpu, Renderer};
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread::JoinHandle;
+use std::thread::{JoinHandle, ScopedJoinHandle};
 use std::time::Instant;
 
 /// A device and its renderer, which are being made while the caller sees to something else.
@@ -55,6 +55,11 @@ pub(crate) fn late<T>(make: impl FnOnce() -> T + Send + 'static) -> Late<T> {
     LazyLock::new(Box::new(make))
 }
 
+/// What a thread made; its panic goes on here.
+pub(crate) fn joined<T>(thread: ScopedJoinHandle<'_, T>) -> T {
+    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
 /// Makes one thing of each item, in their order, on all processors.
 pub(crate) fn at_once<I: Sync, T: Send>(items: &[I], make: impl Fn(&I) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from).min(items.len());
@@ -67,7 +72,7 @@ pub(crate) fn at_once<I: Sync, T: Send>(items: &[I], make: impl Fn(&I) -> T + Sy
         let others: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
         let mut made = work();
         for other in others {
-            made.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            made.extend(joined(other));
         }
         made
     });

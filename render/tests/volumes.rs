@@ -363,6 +363,7 @@ fn lists_are_kept_and_renewed() {
 #[test]
 fn shaders_are_valid() {
     let silhouette = include_str!("../src/volumes/silhouette.wgsl");
+    let thrown = include_str!("../src/volumes/thrown.wgsl");
     let files = [
         (
             "extract",
@@ -374,8 +375,8 @@ fn shaders_are_valid() {
             ]
             .concat(),
         ),
-        ("draw", [harness::VIEW, harness::POSITION, silhouette, include_str!("../src/volumes/draw.wgsl")].concat()),
-        ("quads", [harness::VIEW, harness::POSITION, silhouette, include_str!("../src/volumes/quads.wgsl")].concat()),
+        ("draw", [harness::VIEW, harness::POSITION, silhouette, thrown, include_str!("../src/volumes/draw.wgsl")].concat()),
+        ("quads", [harness::VIEW, harness::POSITION, silhouette, thrown, include_str!("../src/volumes/quads.wgsl")].concat()),
     ];
     for (file, source) in files {
         let module = naga::front::wgsl::parse_str(&source).unwrap_or_else(|e| panic!("{file}: {}", e.emit_to_string(&source)));

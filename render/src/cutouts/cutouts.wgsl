@@ -1,6 +1,6 @@
 // What one shape that alpha cuts holes into hides of one light. Its triangles throw volumes that say where to look; each sample
 // in one asks whether its own ray to the light passes the triangle where the picture is there. Concatenated after
-// shaders/{one_sample, four_samples}.wgsl and shaders/{view, position, material}.wgsl.
+// shaders/{one_sample, four_samples}.wgsl, shaders/{view, position, material, samples}.wgsl and volumes/thrown.wgsl.
 
 struct Cutout {
     world_from_object: mat4x4<f32>,
@@ -23,10 +23,6 @@ const WIDER = 0.01;
 const ON_SURFACE_PIXELS = 1.0 / 32.0;
 // Rounding of a ray, as a share of its length: neighbours must not leave a crack between them.
 const ROUNDING = 1e-6;
-// The standard sample locations of Vulkan, Metal and Direct3D, pixels from the centre.
-const LOCATIONS = array<vec2<f32>, 4>(
-    vec2<f32>(-0.125, -0.375), vec2<f32>(0.375, -0.125), vec2<f32>(-0.375, 0.125), vec2<f32>(0.125, 0.375),
-);
 
 // Of a triangle's volume; corners from the eye, metres in the world.
 struct Volume {
@@ -70,12 +66,7 @@ fn volume(@builtin(vertex_index) index: u32) -> Volume {
     let wide = p + WIDER * (p - (a + b + c) / 3.0);
     var place = vec4<f32>(wide, 1.0);
     if index % 6u >= 3u {
-        let w = caster.reach_w;
-        if light.w == 0.0 {
-            place = vec4<f32>(wide * w - light.xyz, w);
-        } else {
-            place = vec4<f32>(wide - light.xyz * (1.0 - w), w);
-        }
+        place = thrown(place);
     }
     return Volume(clip_from_point(view.clip_from_world, place), a - eye, b - eye, c - eye, triangle);
 }
@@ -145,7 +136,7 @@ fn hidden_samples(v: Volume) -> @builtin(sample_mask) u32 {
     let pixel = floor(v.position.xy);
     var hidden = 0u;
     for (var i = 0; i < SAMPLES; i++) {
-        let location = select(vec2<f32>(0.0), LOCATIONS[i], SAMPLES == 4);
+        let location = select(vec2<f32>(0.0), vec2<f32>(SAMPLES_X[i], SAMPLES_Y[i]), SAMPLES == 4);
         let d = textureLoad(depth, vec2<i32>(pixel), i);
         hidden |= select(0u, 1u << u32(i), hides(v, pixel + 0.5 + location, d));
     }

@@ -12,6 +12,8 @@ const SHADER: &[&str] = &[
     include_str!("../shaders/view.wgsl"),
     include_str!("../shaders/position.wgsl"),
     include_str!("../shaders/material.wgsl"),
+    include_str!("../shaders/samples.wgsl"),
+    include_str!("../volumes/thrown.wgsl"),
     include_str!("cutouts.wgsl"),
 ];
 

@@ -1,4 +1,4 @@
-// What hides a place in a shadow map, and bilinear filters over that. Concatenated after shadow_map.wgsl.
+// What hides a place in a shadow map, and bilinear filters over that. Concatenated after shadow_map.wgsl and samples.wgsl.
 //
 // Every texel that the filter covers is compared with the receiver's own plane at the texel's centre, and at the edges of shadows the
 // caster's plane with the receiver's place. A plane of the world stays a plane in the map's space, so neither flat receivers nor bent
@@ -13,10 +13,6 @@ struct Footprint {
 };
 
 var<private> footprint: Footprint;
-
-// The standard sample locations of Vulkan, Metal and Direct3D, from the middle of the pixel, pixels right and down.
-const SAMPLES_X = vec4<f32>(-0.125, 0.375, -0.375, 0.125);
-const SAMPLES_Y = vec4<f32>(-0.375, -0.125, 0.125, 0.375);
 
 // Middle of the covered samples.
 fn middle_of_footprint() -> vec2<f32> {

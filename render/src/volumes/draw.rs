@@ -12,12 +12,14 @@ pub(super) const LISTED: &str = concat!(
     include_str!("../shaders/view.wgsl"),
     include_str!("../shaders/position.wgsl"),
     include_str!("silhouette.wgsl"),
+    include_str!("thrown.wgsl"),
     include_str!("draw.wgsl")
 );
 pub(super) const QUADS: &str = concat!(
     include_str!("../shaders/view.wgsl"),
     include_str!("../shaders/position.wgsl"),
     include_str!("silhouette.wgsl"),
+    include_str!("thrown.wgsl"),
     include_str!("quads.wgsl")
 );
 

@@ -19,7 +19,7 @@ impl Extent {
         Some(Extent { bounds: *bounds_in_world, reach })
     }
 
-    /// 1 / how far it is thrown, as in volumes/silhouette.wgsl.
+    /// 1 / how far it is thrown, as in volumes/thrown.wgsl.
     pub(crate) fn w(&self) -> f32 {
         self.reach.w()
     }

@@ -54,15 +54,3 @@ fn cast_of(t: vec4<u32>) -> i32 {
     let f = facing(t);
     return select(0, f, contributes(t, f));
 }
-
-// A vertex thrown away from the light. At infinity it is a direction, with w = 0 in the world; view and projection then
-// take it there (against 002, which says to set w after the transformation). Short of infinity it is the same sum with
-// all four numbers divided by the distance, so that one expression serves both.
-fn thrown(p: vec4<f32>) -> vec4<f32> {
-    let light = caster.toward_light;
-    let w = caster.reach_w;
-    if light.w == 0.0 {
-        return vec4<f32>(p.xyz * w - light.xyz, w);
-    }
-    return vec4<f32>(p.xyz - light.xyz * (1.0 - w), w);
-}
