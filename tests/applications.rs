@@ -1,8 +1,10 @@
 //! Several applications in one world: processes that make, lock, refuse, die and leave.
 
+use crate::support::foreign::session_of;
 use crate::support::process::{PATIENCE, Process, prepare};
 use crate::support::until;
 use std::process::Command;
+use zenoh::Wait;
 
 const HOST: &str = r#"
 world.add(transform(#{ name: "ball" }, []));
@@ -133,4 +135,10 @@ fn strangers_are_refused_and_told_of() {
     std::io::Write::write_all(&mut plain, b"GET / HTTP/1.0\r\n\r\n").unwrap();
     host.says("was refused: it does not speak TLS");
     assert!(!stranger.said().contains("is in the world"), "{}", stranger.said());
+    // Who has a certificate of ours, but for another part.
+    let display = session_of("display", &folder.join("ours"), &address);
+    let asked = display.get("umbriel/guests/snapshot").timeout(std::time::Duration::from_secs(1)).wait().unwrap();
+    host.says("a peer at 127.0.0.1:");
+    host.says(" wants to work on the world, which its certificate is not for, and is refused (query, umbriel/guests/snapshot)");
+    drop(asked);
 }

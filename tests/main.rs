@@ -7,6 +7,8 @@ mod cluster;
 mod command;
 #[cfg(all(target_os = "linux", feature = "cluster"))]
 mod display_window;
+#[cfg(feature = "cluster")]
+mod foreign;
 mod layers;
 mod recording;
 mod shadows;

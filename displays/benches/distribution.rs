@@ -268,6 +268,7 @@ fn cluster(display_count: usize, uses_memory: bool, frames: usize, rows: &[(&str
         timeout: TIMEOUT,
         lease: LEASE,
         ahead: true,
+        lines: None,
     })?;
     let mut displays = Vec::new();
     for number in 0..display_count {

@@ -77,8 +77,14 @@ fn serve(endpoint: &str, security: Security, end: &AtomicBool) -> Host {
     graph.set_name(turner, "turner").unwrap();
     let path = graph.create("PositionInterpolator").unwrap();
     graph.set_named(path, "key_value", (0..LONG).map(|place| Vec3::splat(place as f32)).collect::<Vec<Vec3>>()).unwrap();
-    let options =
-        HostOptions { listen: endpoint.into(), security, timeout: Duration::from_millis(500), lease: LEASE, ahead: true };
+    let options = HostOptions {
+        listen: endpoint.into(),
+        security,
+        timeout: Duration::from_millis(500),
+        lease: LEASE,
+        ahead: true,
+        lines: None,
+    };
     let mut host = Host::listen(&options).unwrap();
     let mut frame = 0;
     while !end.load(Ordering::Relaxed) {

@@ -4,6 +4,7 @@ use super::faults::Plan;
 use super::interrupt::Interrupt;
 use super::maps_once::MapsOnce;
 use super::netns::{Hub, Namespace};
+use super::refusals::lines;
 use super::screen::{channel, file_of};
 use super::wire::Wire;
 use super::{Failure, serve};
@@ -48,6 +49,7 @@ pub(crate) fn run(args: &cli::Cluster) -> Result<usize, Failure> {
         lease: lease(args),
         // As `umbriel serve` does, unless each picture of each frame is to be there.
         ahead: args.breaks(),
+        lines: Some(lines),
     };
     let mut host = Host::listen(&options)?;
     let folder = args.out.clone().unwrap_or_else(|| std::env::temp_dir().join(format!("umbriel-cluster-{}", std::process::id())));

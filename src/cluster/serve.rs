@@ -2,6 +2,7 @@
 
 use super::interrupt::Interrupt;
 use super::maps_once::MapsOnce;
+use super::refusals::lines;
 use super::{Failure, security};
 use crate::cli;
 use crate::console::Console;
@@ -18,6 +19,7 @@ pub(crate) fn serve(args: &cli::Serve) -> Result<usize, Failure> {
         timeout: Duration::from_millis(args.timeout_ms),
         lease: args.link.lease(),
         ahead: true,
+        lines: Some(lines),
     };
     let mut host = Host::listen(&options)?;
     let mut desk = Desk::open(&host, &session.name())?;

@@ -1,6 +1,8 @@
 //! What several tests need.
 
 #[cfg(feature = "cluster")]
+pub(crate) mod foreign;
+#[cfg(feature = "cluster")]
 pub(crate) mod process;
 #[cfg(target_os = "linux")]
 pub(crate) mod screen;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
-use umbriel_fields::replica::{Bulk, Packet, Replica};
+use umbriel_fields::replica::{Bulk, Packet, Replica, ReplicaError};
 use umbriel_fields::{Graph, TypeRegistry};
 use zenoh::Wait;
 use zenoh::pubsub::Publisher as ZenohPublisher;
@@ -17,6 +17,7 @@ use super::message::{
     DISPLAY, INPUT, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, Told, bytes_of, message_of, stamped_packet,
 };
 use super::ordered::Outbox;
+use super::quiet::Quiet;
 use super::transport::{ClusterError, End, Security, network};
 
 /// Draws and shows what a follower follows.
@@ -99,6 +100,7 @@ enum Parked {
 /// A display process in the lock.
 pub struct Follower {
     line: Line<Arrived>,
+    endpoint: String,
     name: String,
     types: TypeRegistry,
     ready: ZenohPublisher<'static>,
@@ -120,6 +122,9 @@ pub struct Follower {
     ends_with_application: bool,
     /// Since when there is no link to an application.
     alone_since: Option<Instant>,
+    /// There is an application, and it owes no answer.
+    can_ask: bool,
+    quiet: Quiet,
     is_over: bool,
     /// For the last drawing.
     took: Duration,
@@ -161,6 +166,7 @@ impl Follower {
         line.announce(DISPLAY)?;
         Ok(Follower {
             line,
+            endpoint,
             name: name.into(),
             types: types.into(),
             ready,
@@ -179,6 +185,8 @@ impl Follower {
             refused_since: None,
             ends_with_application,
             alone_since: None,
+            can_ask: false,
+            quiet: Quiet::default(),
             is_over: false,
             took: Duration::ZERO,
             drawn_hash: 0,
@@ -289,7 +297,7 @@ impl Follower {
                     }
                 }
                 // What is damaged is a gap: a snapshot closes it.
-                Err(error) => tracing::error!("a frame cannot be used: {error}"),
+                Err(error) => self.complain("a frame", &error.into()),
             },
             Arrived::Release(bytes) => match message_of::<Release>(&bytes) {
                 Ok(release) => {
@@ -303,30 +311,18 @@ impl Follower {
                     self.step(DisplayEvent::Release { epoch: release.epoch, frame: release.frame, is_mine }, screen)?;
                     self.is_over |= self.ends_with_application && release.is_last && release.epoch == self.lock.epoch();
                 }
-                Err(error) => tracing::error!("{error}"),
+                Err(error) => self.complain("a release", &error),
             },
-            Arrived::Snapshot(Ok(bytes)) => {
-                self.refused_since = None;
-                let (epoch, packet) = stamped_packet(bytes).map_err(ClusterError::from)?;
-                let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
-                self.line.ask_for_bulk(missing, Arrived::Bulk);
-                self.snapshot = Some(packet);
-                self.parked.retain(|parked| matches!(parked, Parked::Frame(..)));
-                self.parked.push_front(Parked::Snapshot(epoch, frame));
-            }
-            Arrived::Snapshot(Err(reason)) if reason.starts_with("there is a display") => {
-                let since = *self.refused_since.get_or_insert_with(Instant::now);
-                if since.elapsed() > NAME_IS_FREE_AFTER {
-                    return Err(ClusterError::Refused(reason).into());
-                }
-            }
-            Arrived::Snapshot(Err(reason)) if reason.starts_with("it ") => return Err(ClusterError::Refused(reason).into()),
-            Arrived::Snapshot(Err(reason)) => tracing::debug!("no snapshot: {reason}"),
+            Arrived::Snapshot(answer) => self.answered(answer)?,
             Arrived::Bulk(hash, Ok(bytes)) => {
                 self.line.bulk_answered(hash);
                 match self.bulk.learn(hash, &bytes) {
                     Ok(()) => self.line.keep_bulk(hash, bytes),
-                    Err(error) => tracing::error!("{error}"),
+                    Err(error) => {
+                        self.complain("a long value", &error.into());
+                        // What waits for it is a gap as well.
+                        self.parked.clear();
+                    }
                 }
                 [self.report.fetched, self.report.kept] = self.line.fetched;
             }
@@ -338,6 +334,7 @@ impl Follower {
             }
             Arrived::Application(true) => {
                 self.alone_since = None;
+                self.can_ask = true;
                 note(&mut self.progress.found);
                 self.line.begin();
                 self.step(DisplayEvent::Linked, screen)?;
@@ -352,10 +349,68 @@ impl Follower {
                 }
                 self.line.begin();
                 tracing::warn!("display `{}`: the application is gone; waiting for it to come back", self.name);
-                self.alone_since = Some(Instant::now());
+                (self.alone_since, self.can_ask) = (Some(Instant::now()), false);
             }
         }
         self.unpark(screen)
+    }
+
+    /// The application answers who asked for everything.
+    fn answered(&mut self, answer: Answer) -> Result<(), ClusterError> {
+        self.can_ask = true;
+        match answer {
+            Ok(bytes) => {
+                self.refused_since = None;
+                match stamped_packet(bytes) {
+                    Ok((epoch, packet)) => {
+                        let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
+                        self.line.ask_for_bulk(missing, Arrived::Bulk);
+                        self.snapshot = Some(packet);
+                        self.parked.retain(|parked| matches!(parked, Parked::Frame(..)));
+                        self.parked.push_front(Parked::Snapshot(epoch, frame));
+                    }
+                    // It is asked for again.
+                    Err(error) => self.complain("the world", &error.into()),
+                }
+            }
+            Err(reason) if reason.starts_with("there is a display") => {
+                let since = *self.refused_since.get_or_insert_with(Instant::now);
+                if since.elapsed() > NAME_IS_FREE_AFTER {
+                    return Err(ClusterError::Refused(reason));
+                }
+            }
+            Err(reason) if reason.starts_with("it ") => return Err(ClusterError::Refused(reason)),
+            Err(reason) => tracing::debug!("no snapshot: {reason}"),
+        }
+        Ok(())
+    }
+
+    /// Says what came and cannot be used, from where, and where this display stands.
+    fn complain(&mut self, what: &str, error: &ClusterError) {
+        let frame = self
+            .replica
+            .as_ref()
+            .map_or_else(|| "there is no world here yet".into(), |replica| format!("the last frame here is {}", replica.frame()));
+        let words = format!("{what} from {} cannot be used: {error}; {frame}", self.endpoint);
+        if self.quiet.is_news(&words) {
+            tracing::error!("{words}");
+        }
+    }
+
+    fn tell_unknown(&mut self, types: Vec<String>) {
+        for name in types {
+            let words = format!(
+                "the application's node type `{name}` is not known here: its nodes are held, and nothing is drawn for them"
+            );
+            if self.quiet.is_news(&words) {
+                tracing::info!("{words}");
+            }
+        }
+    }
+
+    /// Long values are awaited that the world here needs first.
+    fn awaits_world(&self) -> bool {
+        self.line.awaits_bulk() && self.parked.iter().any(|parked| matches!(parked, Parked::Snapshot(..)))
     }
 
     /// Tells the lock what is complete, in order.
@@ -383,15 +438,25 @@ impl Follower {
             let now_us = self.started.elapsed().as_micros() as u64;
             for action in self.lock.step(now_us, event) {
                 match action {
+                    // What is on its way already does not come sooner for being asked for twice.
+                    DisplayAction::Fetch if !self.can_ask || self.awaits_world() => {}
                     DisplayAction::Fetch => {
+                        self.can_ask = false;
                         let join = Join { protocol: PROTOCOL, display: self.line.id, name: self.name.clone() };
                         self.line.get(SNAPSHOT.into(), bytes_of(&join), Arrived::Snapshot);
                     }
                     DisplayAction::Restore(frame) => {
-                        self.restore()?;
+                        match self.restore() {
+                            Ok(()) => {}
+                            Err(error @ ClusterError::Replica(ReplicaError::OtherField { .. })) => return Err(error.into()),
+                            Err(error) => {
+                                self.complain("the world", &error);
+                                events.push_back(DisplayEvent::Unusable);
+                            }
+                        }
                         self.packets = self.packets.split_off(&(frame + 1));
                     }
-                    DisplayAction::Apply(frame) => events.push_back(self.apply(frame)?),
+                    DisplayAction::Apply(frame) => events.push_back(self.apply(frame)),
                     DisplayAction::Draw(frame) => {
                         let began = Instant::now();
                         note(&mut self.progress.draws);
@@ -440,11 +505,7 @@ impl Follower {
     fn restore(&mut self) -> Result<(), ClusterError> {
         let packet = self.snapshot.take().ok_or_else(|| ClusterError::Message("there is no snapshot".into()))?;
         let mut fresh = Replica::new(&packet, self.types.clone(), &self.bulk)?;
-        for name in fresh.unknown_types() {
-            tracing::info!(
-                "the application's node type `{name}` is not known here: its nodes are held, and nothing is drawn for them"
-            );
-        }
+        self.tell_unknown(fresh.unknown_types());
         if let Some(doubted) = self.doubted.take()
             && doubted.frame() == fresh.frame()
             && let Some(difference) = doubted.difference(&fresh)
@@ -453,7 +514,7 @@ impl Follower {
             self.report.differences.push(difference.to_string());
         }
         if !fresh.agrees() {
-            tracing::error!("the snapshot of frame {} is not what its hash says", fresh.frame());
+            return Err(ClusterError::Message(format!("the world of frame {} is not what its hash says", fresh.frame())));
         }
         self.report.snapshots += 1;
         note(&mut self.progress.world);
@@ -462,24 +523,27 @@ impl Follower {
         Ok(())
     }
 
-    fn apply(&mut self, frame: u64) -> Result<DisplayEvent, ClusterError> {
+    fn apply(&mut self, frame: u64) -> DisplayEvent {
         let (Some(packet), Some(replica)) = (self.packets.remove(&frame), &mut self.replica) else {
-            return Ok(DisplayEvent::Diverged(frame));
+            return DisplayEvent::Diverged(frame);
         };
         let applied = replica.apply(&packet, &self.bulk);
         self.line.reuse(packet.into_bytes());
         match applied {
-            Ok(()) if replica.agrees() => return Ok(DisplayEvent::Applied(frame)),
+            Ok(()) if replica.agrees() => {
+                let unknown = replica.unknown_types();
+                self.tell_unknown(unknown);
+                return DisplayEvent::Applied(frame);
+            }
             Ok(()) => {
                 tracing::warn!("frame {frame}: the world here is not that of the application; fetching it");
                 self.doubted = self.replica.take();
             }
-            Err(error @ umbriel_fields::replica::ReplicaError::OtherField { .. }) => return Err(error.into()),
             Err(error) => {
-                tracing::error!("frame {frame} cannot be applied: {error}");
+                self.complain(&format!("frame {frame}"), &error.into());
                 self.replica = None;
             }
         }
-        Ok(DisplayEvent::Diverged(frame))
+        DisplayEvent::Diverged(frame)
     }
 }

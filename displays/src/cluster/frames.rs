@@ -35,7 +35,7 @@ impl Memory {
     pub(super) fn read(&self, message: &[u8]) {
         let whereabouts = match message_of::<Whereabouts>(message) {
             Ok(whereabouts) => whereabouts,
-            Err(error) => return tracing::error!("{error}"),
+            Err(error) => return tracing::error!("where a frame lies: {error}"),
         };
         let found = self.reader.lock().unwrap_or_else(PoisonError::into_inner).read(&whereabouts);
         self.token.store(whereabouts.token, Ordering::Relaxed);

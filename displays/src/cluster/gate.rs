@@ -1,15 +1,18 @@
 //! Where the application's thread and those of the network meet: who is there, what waits to be published, and the lock, which
 //! releases a frame the moment that the last display is ready, whatever the application does meanwhile.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::event::{Event, Input};
+use super::lines::{self, Lines};
 use super::lock::{ApplicationAction, ApplicationEvent, ApplicationLock, DisplayId};
 use super::message::{Ready, Release, Told, message_of};
 use super::ordered::Inbox;
 use super::outlets::{Outlets, Parcel};
+use super::quiet::Quiet;
+use super::transport::ClusterError;
 use super::waits::Waits;
 
 /// How often it is looked whether somebody is late.
@@ -55,7 +58,12 @@ pub(super) struct Gate {
     ahead: bool,
     is_last: bool,
     hashes: HashMap<u64, u64>,
+    /// Displays whose lines stand. Nobody else is waited for, or has a name.
+    there: BTreeSet<u64>,
     pub(super) names: BTreeMap<u64, String>,
+    /// Of this process, where they are known.
+    lines: Option<Lines>,
+    quiet: Quiet,
     pub(super) inputs: Vec<Input>,
     /// By number of the display.
     inboxes: BTreeMap<u64, Inbox<Event>>,
@@ -80,6 +88,7 @@ impl Gate {
         ahead: bool,
         epoch: u64,
         outlets: Arc<Outlets>,
+        lines: Option<Lines>,
         wake: impl Fn() + Send + 'static,
     ) -> SharedGate {
         let gate = Arc::new(Mutex::new(Gate {
@@ -92,7 +101,10 @@ impl Gate {
             ahead,
             is_last: false,
             hashes: HashMap::new(),
+            there: BTreeSet::new(),
             names: BTreeMap::new(),
+            lines,
+            quiet: Quiet::default(),
             inputs: Vec::new(),
             inboxes: BTreeMap::new(),
             report: HostReport::default(),
@@ -133,10 +145,25 @@ impl Gate {
     pub(super) fn is_ready(&mut self, bytes: &[u8]) {
         let ready = match message_of::<Ready>(bytes) {
             Ok(ready) => ready,
-            Err(error) => return tracing::warn!("from a display: {error}"),
+            Err(error) => return self.cannot_read("a report", bytes, &error),
         };
-        if ready.epoch != self.epoch || self.twin(ready.display, &ready.name).is_some() {
+        let Ready { display, frame, epoch, .. } = ready;
+        if epoch != self.epoch {
             return;
+        }
+        let (name, last) = (&ready.name, self.lock.frame());
+        let at = || lines::at(self.lines, display);
+        let fault = if !self.there.contains(&display) {
+            Some(format!("somebody who is no display{} says that `{name}` is ready with frame {frame}", at()))
+        } else if self.twin(display, name).is_some() {
+            Some(format!("another process{} says that it is display `{name}`, ready with frame {frame}", at()))
+        } else if frame > last {
+            Some(format!("display `{name}`{} says that it is ready with frame {frame}, and the last one is {last}", at()))
+        } else {
+            None
+        };
+        if let Some(fault) = fault {
+            return self.complain(&format!("{fault}; it is not listened to"));
         }
         // Its link broke and came back before it missed a frame.
         let name = self.names.entry(ready.display).or_insert(ready.name);
@@ -154,7 +181,7 @@ impl Gate {
     pub(super) fn is_told(&mut self, bytes: &[u8]) {
         let told = match message_of::<Told>(bytes) {
             Ok(told) => told,
-            Err(error) => return tracing::warn!("from a display: {error}"),
+            Err(error) => return self.cannot_read("what happened at a display", bytes, &error),
         };
         // Who is not known by name says it again once it has joined.
         let Some(name) = self.names.get(&told.display).filter(|_| told.epoch == self.epoch) else { return };
@@ -163,8 +190,49 @@ impl Gate {
         self.inputs.extend(inputs.map(|event| Input { display: name.clone(), event }));
     }
 
+    fn cannot_read(&mut self, what: &str, bytes: &[u8], error: &ClusterError) {
+        let (length, frame) = (bytes.len(), self.lock.frame());
+        let whom = lines::others(self.lines, |number| self.names.contains_key(&number));
+        self.complain(&format!("{what}, {length} bytes, at frame {frame}: {error}{whom}"));
+    }
+
+    fn complain(&mut self, words: &str) {
+        if self.quiet.is_news(words) {
+            tracing::warn!("{words}");
+        }
+    }
+
+    /// The line of a display stands.
+    pub(super) fn is_there(&mut self, number: u64) {
+        self.there.insert(number);
+    }
+
+    /// A display joins; false if it was known already. Its name is its own as long as its line stands.
+    pub(super) fn joins(&mut self, number: u64, name: &str) -> bool {
+        self.there.contains(&number) && self.names.insert(number, name.into()).is_none()
+    }
+
+    /// A refused display, with where it is.
+    pub(super) fn refuses(&mut self, number: Option<u64>, reason: &str) {
+        let whom = match number {
+            Some(number) => lines::at(self.lines, number),
+            None => lines::others(self.lines, |number| self.names.contains_key(&number)),
+        };
+        self.complain(&match number {
+            Some(_) => format!("a display{whom} is refused: {reason}"),
+            None => format!("a display is refused: {reason}{whom}"),
+        });
+        self.report.refused += 1;
+    }
+
+    /// Where a process is, for the log.
+    pub(super) fn at(&self, number: u64) -> String {
+        lines::at(self.lines, number)
+    }
+
     /// A display left, or its line broke.
     pub(super) fn is_gone(&mut self, number: u64) {
+        self.there.remove(&number);
         if let Some(name) = self.names.remove(&number) {
             tracing::info!("display `{name}` is gone");
         }

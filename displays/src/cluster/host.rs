@@ -14,6 +14,7 @@ use zenoh::{Session, Wait};
 
 use super::event::Input;
 use super::gate::{Gate, HostReport, SharedGate, Staged, enter};
+use super::lines::Lines;
 use super::memory::Shelf;
 use super::message::{APPLICATION, BULK, DISPLAY, INPUT, Join, PROTOCOL, READY, SNAPSHOT, message_of, stamped};
 use super::neighbours::Listening;
@@ -34,6 +35,8 @@ pub struct HostOptions {
     /// The application may make a frame while displays draw the one before: who then fetches everything misses that one. If not, each frame
     /// is released before the application goes on.
     pub ahead: bool,
+    /// What tells whom lines lead to, for the log.
+    pub lines: Option<Lines>,
 }
 
 enum Arrived {
@@ -60,7 +63,6 @@ pub struct Host {
     /// Requests that came while the graph was being written.
     deferred: Vec<Query>,
     snapshot: Option<(u64, Arc<[u8]>)>,
-    refused_last: Option<String>,
     _held: (Vec<Subscriber<()>>, Vec<Queryable<()>>, LivelinessToken),
     _listening: Option<Listening>,
     session: Session,
@@ -93,10 +95,11 @@ fn subscribe(session: &Session, gate: &SharedGate) -> Result<Vec<Subscriber<()>>
         subscribers.push(session.declare_subscriber(key).callback(take).wait().map_err(network)?);
     }
     let gate = gate.clone();
-    let alive = session.liveliness().declare_subscriber(format!("{DISPLAY}/*")).callback(move |sample| {
-        let number = sample.key_expr().as_str().rsplit('/').next().and_then(|number| number.parse().ok());
-        if let (SampleKind::Delete, Some(number)) = (sample.kind(), number) {
-            enter(&gate).is_gone(number);
+    let alive = session.liveliness().declare_subscriber(format!("{DISPLAY}/*")).history(true).callback(move |sample| {
+        let Some(number) = sample.key_expr().as_str().rsplit('/').next().and_then(|number| number.parse().ok()) else { return };
+        match sample.kind() {
+            SampleKind::Put => enter(&gate).is_there(number),
+            SampleKind::Delete => enter(&gate).is_gone(number),
         }
     });
     subscribers.push(alive.wait().map_err(network)?);
@@ -112,7 +115,7 @@ impl Host {
         let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_micros() as u64;
         let turns = sender.clone();
         let wake = move || drop(turns.send(Arrived::Turn));
-        let gate = Gate::open(options.timeout, options.ahead, epoch, outlets.clone(), wake);
+        let gate = Gate::open(options.timeout, options.ahead, epoch, outlets.clone(), options.lines, wake);
         let subscribers = subscribe(&session, &gate)?;
         let mut queryables = Vec::new();
         for (key, kind) in
@@ -138,7 +141,6 @@ impl Host {
             epoch,
             deferred: Vec::new(),
             snapshot: None,
-            refused_last: None,
             _held: (subscribers, queryables, token),
             _listening: listening,
             session,
@@ -247,26 +249,14 @@ impl Host {
     }
 
     fn joins(&mut self, graph: &Graph, query: Query) {
-        let answer = match query.payload().map(|payload| message_of::<Join>(&payload.to_bytes())) {
-            Some(Ok(join)) if join.protocol != PROTOCOL => Err(format!(
-                "it speaks version {} of the protocol, the application speaks {PROTOCOL} (display `{}`)",
-                join.protocol, join.name
-            )),
-            Some(Ok(join)) if enter(&self.gate).twin(join.display, &join.name).is_some() => {
-                Err(format!("there is a display `{}` already", join.name))
-            }
-            Some(Ok(join)) => Ok(join),
-            Some(Err(error)) => Err(error.to_string()),
-            None => Err("it does not say who it is".into()),
+        let (number, answer) = match query.payload().map(|payload| message_of::<Join>(&payload.to_bytes())) {
+            Some(Ok(join)) => (Some(join.display), self.lets_in(join)),
+            Some(Err(error)) => (None, Err(error.to_string())),
+            None => (None, Err("it does not say who it is".into())),
         };
         let answer = match answer {
             Err(reason) => {
-                // Who is refused asks again and again.
-                if self.refused_last.as_deref() != Some(&*reason) {
-                    tracing::warn!("a display is refused: {reason}");
-                    self.refused_last = Some(reason.clone());
-                }
-                enter(&self.gate).report.refused += 1;
+                enter(&self.gate).refuses(number, &reason);
                 Err(reason)
             }
             Ok(join) => {
@@ -274,14 +264,34 @@ impl Host {
                     return self.deferred.push(query);
                 }
                 let Some(snapshot) = self.snapshot(graph) else { return self.deferred.push(query) };
-                self.refused_last = None;
-                if enter(&self.gate).names.insert(join.display, join.name.clone()).is_none() {
-                    tracing::info!("display `{}` joins at frame {}", join.name, self.publisher.last_frame());
+                let mut gate = enter(&self.gate);
+                if gate.joins(join.display, &join.name) {
+                    let at = gate.at(join.display);
+                    tracing::info!("display `{}`{at} joins at frame {}", join.name, self.publisher.last_frame());
                 }
                 Ok(snapshot)
             }
         };
         let _ = self.replies.send((query, answer));
+    }
+
+    /// Who may not come in, and why.
+    fn lets_in(&self, join: Join) -> Result<Join, String> {
+        if join.protocol != PROTOCOL {
+            return Err(format!(
+                "it speaks version {} of the protocol, the application speaks {PROTOCOL} (display `{}`)",
+                join.protocol, join.name
+            ));
+        }
+        match enter(&self.gate).twin(join.display, &join.name) {
+            Some(_) => Err(format!("there is a display `{}` already", join.name)),
+            None => Ok(join),
+        }
+    }
+
+    /// Where a process is, for the log.
+    pub(super) fn at(&self, number: u64) -> String {
+        enter(&self.gate).at(number)
     }
 
     /// As of the last frame; made once per frame.

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use crossbeam::channel::{Receiver, Sender, unbounded};
 use zenoh::liveliness::LivelinessToken;
@@ -12,6 +13,7 @@ use zenoh::{Session, Wait};
 
 use super::cache::Cache;
 use super::frames::Frames;
+use super::lines::number_of_process;
 use super::message::{APPLICATION, BULK};
 use super::near::{Bell, Word};
 use super::short::Short;
@@ -57,6 +59,21 @@ impl<A> Post<A> {
     }
 }
 
+/// A question that is dropped once nobody is left who could answer it.
+struct Asked<A, F: Fn(Answer) -> A> {
+    post: Post<A>,
+    arrived: F,
+    is_answered: AtomicBool,
+}
+
+impl<A, F: Fn(Answer) -> A> Drop for Asked<A, F> {
+    fn drop(&mut self) {
+        if !self.is_answered.load(Ordering::Relaxed) {
+            self.post.send((self.arrived)(Err("nobody answers".into())));
+        }
+    }
+}
+
 /// A link; `A` is what arrives.
 pub(super) struct Line<A> {
     pub(super) session: Session,
@@ -88,8 +105,7 @@ impl<A: Send + 'static> Line<A> {
         application: fn(bool) -> A,
     ) -> Result<Line<A>, ClusterError> {
         let session = open(endpoint, security, end, lease)?;
-        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64;
-        let id = since ^ (std::process::id() as u64) << 40;
+        let id = number_of_process(&session.zid().to_string()).unwrap_or_default();
         let (sender, arrived) = unbounded();
         let post = Post { sender, bell: Arc::new(Bell::new()) };
         let framed = post.clone();
@@ -201,15 +217,16 @@ impl<A: Send + 'static> Line<A> {
         Ok(())
     }
 
-    /// Asks the application; the answer arrives.
+    /// Asks the application; the answer arrives, or that there is none.
     pub(super) fn get(&self, key: String, payload: Vec<u8>, arrived: impl Fn(Answer) -> A + Send + Sync + 'static) {
-        let post = self.post.clone();
+        let asked = Asked { post: self.post.clone(), arrived, is_answered: AtomicBool::new(false) };
         let sent = self.session.get(key).payload(payload).timeout(ANSWER).callback(move |reply| {
             let answer = match reply.into_result() {
                 Ok(sample) => Ok(sample.payload().to_bytes().into_owned()),
                 Err(error) => Err(String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()),
             };
-            post.send(arrived(answer));
+            asked.is_answered.store(true, Ordering::Relaxed);
+            asked.post.send((asked.arrived)(answer));
         });
         if let Err(error) = sent.wait() {
             tracing::debug!("cannot ask: {error}");

@@ -128,8 +128,13 @@ pub(super) fn bytes_of(message: &impl Serialize) -> Vec<u8> {
     postcard::to_stdvec(message).unwrap_or_default()
 }
 
+/// A message, and nothing behind it.
 pub(super) fn message_of<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, ClusterError> {
-    postcard::from_bytes(bytes).map_err(|error| ClusterError::Message(error.to_string()))
+    match postcard::take_from_bytes(bytes) {
+        Ok((message, [])) => Ok(message),
+        Ok((_, rest)) => Err(ClusterError::Message(format!("{} bytes are left over", rest.len()))),
+        Err(error) => Err(ClusterError::Message(error.to_string())),
+    }
 }
 
 /// A packet with the run of the application behind it.

@@ -24,6 +24,8 @@ mod host;
 #[cfg(feature = "cluster")]
 mod line;
 #[cfg(feature = "cluster")]
+mod lines;
+#[cfg(feature = "cluster")]
 mod memory;
 #[cfg(feature = "cluster")]
 mod message;
@@ -37,6 +39,8 @@ mod ordered;
 mod outlets;
 #[cfg(feature = "cluster")]
 mod proxy;
+#[cfg(feature = "cluster")]
+mod quiet;
 #[cfg(feature = "cluster")]
 mod rights;
 #[cfg(feature = "cluster")]
@@ -54,7 +58,9 @@ pub use self::{
     follower::{Follower, FollowerOptions, FollowerReport, Progress, Screen},
     gate::HostReport,
     host::{Host, HostOptions},
+    lines::{Lines, number_of_process},
     proxy::Proxy,
+    quiet::Quiet,
     transport::{ClusterError, LEASE, Security},
     waits::Waits,
 };

@@ -17,7 +17,7 @@ use crate::cluster::message::{
     DEEDS, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word, bytes_of, message_of,
 };
 use crate::cluster::transport::network;
-use crate::cluster::{ClusterError, Host};
+use crate::cluster::{ClusterError, Host, Quiet};
 
 /// How long a guest that cannot be reached keeps its nodes and locks.
 const GRACE: Duration = Duration::from_secs(2);
@@ -47,6 +47,7 @@ pub struct Desk {
     bulk: Bulk,
     changed: BTreeSet<u64>,
     word: Word,
+    quiet: Quiet,
     _held: (Vec<Subscriber<()>>, Queryable<()>),
 }
 
@@ -84,6 +85,7 @@ impl Desk {
             bulk: Bulk::new(),
             changed: BTreeSet::new(),
             word: Word::default(),
+            quiet: Quiet::default(),
             _held: (subscribers, queryable),
         })
     }
@@ -105,7 +107,12 @@ impl Desk {
                             self.step(OwnershipEvent::Arrived(guest, number), graph);
                         }
                     }
-                    Err(error) => tracing::warn!("from a guest: {error}"),
+                    Err(error) => {
+                        let words = format!("what an application did, {} bytes: {error}", bytes.len());
+                        if self.quiet.is_news(&words) {
+                            tracing::warn!("{words}");
+                        }
+                    }
                 },
                 Arrived::Join(query) => self.joins.push(query),
                 Arrived::Token(guest, true) => self.step(OwnershipEvent::Found(GuestId(guest)), graph),
@@ -149,6 +156,7 @@ impl Desk {
     pub fn welcome(&mut self, host: &mut Host, graph: &Graph) {
         for query in std::mem::take(&mut self.joins) {
             let join = query.payload().map(|payload| message_of::<GuestJoin>(&payload.to_bytes()));
+            let at = join.iter().flatten().next().map_or_else(String::new, |join| host.at(join.guest));
             let answer = match join {
                 Some(Ok(join)) => self.joins(host, graph, join),
                 Some(Err(error)) => Err(error.to_string()),
@@ -158,7 +166,10 @@ impl Desk {
             let sent = match answer {
                 Ok(bytes) => query.reply(key, bytes).wait(),
                 Err(reason) => {
-                    tracing::warn!("a guest is refused: {reason}");
+                    let words = format!("an application{at} is refused: {reason}");
+                    if self.quiet.is_news(&words) {
+                        tracing::warn!("{words}");
+                    }
                     query.reply_err(reason).wait()
                 }
             };

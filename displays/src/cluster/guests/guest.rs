@@ -214,9 +214,11 @@ impl Guest {
             },
             Arrived::World(Ok(bytes)) => {
                 self.refused_since = None;
-                let (word, snapshot) = message_of::<(Word, Vec<u8>)>(&bytes)?;
-                match stamped_packet(snapshot) {
-                    Ok((epoch, packet)) => self.world = Some((word, epoch, packet)),
+                let read = message_of::<(Word, Vec<u8>)>(&bytes);
+                let read = read.and_then(|(word, snapshot)| Ok((word, stamped_packet(snapshot)?)));
+                match read {
+                    Ok((word, (epoch, packet))) => self.world = Some((word, epoch, packet)),
+                    // It is asked for again.
                     Err(error) => tracing::error!("the world cannot be used: {error}"),
                 }
             }

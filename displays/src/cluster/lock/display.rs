@@ -12,6 +12,8 @@ const PATIENCE_US: TimeUs = 20_000;
 const REPEAT_US: TimeUs = 40_000;
 /// More frames than this are not kept to catch up with: a snapshot is less work.
 const BACKLOG: usize = 256;
+/// Who answers for so long, while nothing comes of the run that is followed, is the application: the word of a later run was none.
+const BELIEVED_US: TimeUs = 1_000_000;
 
 /// What happens to a display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +45,8 @@ pub enum DisplayEvent {
     Applied(u64),
     /// The frame could not be applied, or the replica does not agree with the application after it.
     Diverged(u64),
+    /// No replica could be made of the snapshot.
+    Unusable,
     /// The frame was drawn.
     Drawn(u64),
     /// An application can be asked from now on. What was asked for before went to nobody.
@@ -84,6 +88,8 @@ pub struct DisplayLock {
     shown: u64,
     /// The last frame that the application let others show. Those before it are not worth drawing, except to be warm.
     released: u64,
+    /// The last frame that came, or that a snapshot was as of.
+    newest: u64,
     /// Nothing was drawn since the last snapshot: pipelines, meshes and textures are not on the GPU yet.
     is_cold: bool,
     /// When a snapshot was last asked for, while one is needed.
@@ -92,6 +98,8 @@ pub struct DisplayLock {
     /// Since when a frame could be drawn, but for the last one, which is not known to be released.
     held_since_us: Option<TimeUs>,
     said_ready_us: TimeUs,
+    /// Since when an earlier run answers, while nothing comes of this one.
+    answered_since_us: Option<TimeUs>,
 }
 
 impl DisplayLock {
@@ -120,6 +128,10 @@ impl DisplayLock {
         let mut actions = Vec::new();
         match event {
             DisplayEvent::Frame { epoch, frame } if self.is_current(epoch, &mut actions) => {
+                if frame > self.newest {
+                    // No later one is released, whatever was said.
+                    (self.newest, self.released) = (frame, self.released.min(frame));
+                }
                 if self.applied.is_none_or(|applied| frame > applied) {
                     self.waiting.insert(frame);
                 }
@@ -128,12 +140,16 @@ impl DisplayLock {
                 }
                 self.advance(now_us, &mut actions);
             }
-            DisplayEvent::Snapshot { epoch, frame } if self.is_current(epoch, &mut actions) => {
+            DisplayEvent::Snapshot { epoch, frame }
+                if self.believes(now_us, epoch, &mut actions) || self.is_current(epoch, &mut actions) =>
+            {
                 if self.applied.is_none() {
                     (self.applied, self.fetching_since_us) = (Some(frame), None);
                     self.is_cold = true;
                     actions.push(DisplayAction::Restore(frame));
                     self.waiting = self.waiting.split_off(&(frame + 1));
+                    self.waiting.split_off(&(frame + BACKLOG as u64));
+                    self.newest = self.waiting.last().copied().unwrap_or(frame);
                 }
                 self.advance(now_us, &mut actions);
             }
@@ -157,6 +173,9 @@ impl DisplayLock {
                 self.is_applying = false;
                 self.applied = None;
                 self.advance(now_us, &mut actions);
+            }
+            DisplayEvent::Unusable => {
+                (self.applied, self.fetching_since_us) = (None, Some(now_us));
             }
             DisplayEvent::Drawn(frame) => {
                 // What was drawn for another run of the application is worth nothing.
@@ -193,7 +212,25 @@ impl DisplayLock {
             *self = Self { epoch, is_applying, fetching_since_us, ..Self::default() };
             actions.push(DisplayAction::Forget);
         }
-        epoch == self.epoch
+        let is_current = epoch == self.epoch;
+        if is_current {
+            self.answered_since_us = None;
+        }
+        is_current
+    }
+
+    /// True for the answer of an earlier run that turns out to be the one that there is.
+    fn believes(&mut self, now_us: TimeUs, epoch: u64, actions: &mut Vec<DisplayAction>) -> bool {
+        if epoch >= self.epoch || self.applied.is_some() {
+            return false;
+        }
+        let since = *self.answered_since_us.get_or_insert(now_us);
+        if now_us < since + BELIEVED_US {
+            return false;
+        }
+        *self = Self { epoch, is_applying: self.is_applying, ..Self::default() };
+        actions.push(DisplayAction::Forget);
+        true
     }
 
     fn lose(&mut self, actions: &mut Vec<DisplayAction>) {

@@ -1,5 +1,5 @@
 //! A seeded simulation of one application and several displays: messages are late, lost, repeated and out of order, displays and the
-//! application freeze, crash and come back, replicas are corrupted. What must hold holds at every step.
+//! application freeze, crash and come back, replicas are corrupted, releases are forged. What must hold holds at every step.
 //!
 //! `UMBRIEL_LOCK_SEEDS=2000 cargo test --release -p umbriel-displays lock` runs more of it.
 
@@ -12,6 +12,8 @@ use super::{
 
 const TICK_US: TimeUs = 5_000;
 const FRAME_US: TimeUs = 16_667;
+/// No run of the application has such a number, but garbage may.
+const NEVER: u64 = 1 << 60;
 
 /// A stream of random numbers (SplitMix64).
 struct Dice(u64);
@@ -116,6 +118,7 @@ struct Tally {
     fetches: u64,
     diverged: u64,
     restarts: u64,
+    forged: u64,
     longest_stall_us: TimeUs,
     longest_rejoin_us: TimeUs,
 }
@@ -330,7 +333,10 @@ impl Simulation {
             }
             Message::Drawn(frame) => {
                 display.busy_until_us = 0;
-                display.drawn = display.drawn.max((display.lock.epoch(), frame));
+                // What is drawn for a run that never was counts for none.
+                if display.lock.epoch() < NEVER {
+                    display.drawn = display.drawn.max((display.lock.epoch(), frame));
+                }
                 DisplayEvent::Drawn(frame)
             }
             _ => DisplayEvent::Tick,
@@ -423,6 +429,14 @@ impl Simulation {
                 self.world = self.epoch;
                 self.application = ApplicationLock::new(TIMEOUT_US);
             }
+            55..58 => {
+                // Garbage that reads as a release.
+                let epoch = if self.dice.chance(500) { self.epoch } else { NEVER + self.dice.below(5) };
+                let frame = if self.dice.chance(500) { self.dice.below(1000) } else { u64::MAX };
+                self.tally.forged += 1;
+                let id = self.displays[place].id;
+                self.at(100, Some(place), id, Message::Release { epoch, frame, may_show: Vec::new() });
+            }
             _ => {}
         }
     }
@@ -500,11 +514,12 @@ fn the_lock_holds_in_every_run() {
         all.fetches += tally.fetches;
         all.diverged += tally.diverged;
         all.restarts += tally.restarts;
+        all.forged += tally.forged;
         all.longest_stall_us = all.longest_stall_us.max(tally.longest_stall_us);
         all.longest_rejoin_us = all.longest_rejoin_us.max(tally.longest_rejoin_us);
     }
     println!("{all:?}");
-    assert!(all.drops > 0 && all.diverged > 0 && all.restarts > 0, "no fault showed: {all:?}");
+    assert!(all.drops > 0 && all.diverged > 0 && all.restarts > 0 && all.forged > 0, "no fault showed: {all:?}");
 }
 
 /// One display of three needs half to one and a half times the timeout for a frame. Each time that it is waited for in vain costs the
