@@ -108,8 +108,9 @@ fn open(instance: &wgpu::Instance, adapter: wgpu::Adapter) -> Result<Gpu, Error>
     if is_software {
         keep_freed_memory();
     }
-    // Software waits for all of a pass to read its clock, which takes a part of the frame.
-    let clock = if is_software { wgpu::Features::empty() } else { wgpu::Features::TIMESTAMP_QUERY };
+    let mut clock = wgpu::Features::TIMESTAMP_QUERY;
+    // See `handover.rs`.
+    clock.set(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES, is_software);
     let wanted = clock | wgpu::Features::DEPTH_CLIP_CONTROL;
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("umbriel"),

@@ -17,6 +17,7 @@ mod deform;
 mod draws;
 mod error;
 mod gpu;
+mod handover;
 mod jobs;
 mod layouts;
 mod lighting;

@@ -6,6 +6,7 @@ use crate::contours::Contours;
 use crate::cutouts::Cutouts;
 use crate::deform::Deformer;
 use crate::draws::{Batch, Draw, Kind};
+use crate::handover::Handover;
 use crate::maps::Maps;
 use crate::plan::{BLACK_FILM, Step, Then, ViewPlan};
 use crate::screen::Screen;
@@ -101,6 +102,7 @@ pub(crate) struct Recorder<'a> {
     pub(crate) films: &'a Slots<uniforms::Film>,
     pub(crate) lighting: Option<&'a wgpu::BindGroup>,
     pub(crate) clock: &'a Clock,
+    pub(crate) handover: &'a Handover,
     pub(crate) stats: &'a mut FrameStats,
 }
 
@@ -134,7 +136,7 @@ impl Recorder<'_> {
             copy_depth(encoder, to);
             pass = begin_part(encoder, self.clock, "shadow volumes", to, part(false, true));
         }
-        for view in views {
+        for (place, view) in views.iter().enumerate() {
             enter(&mut pass, view);
             if !reads_depth {
                 self.depth_and_base(&mut pass, view);
@@ -147,6 +149,7 @@ impl Recorder<'_> {
                 self.hard_step(&mut pass, (view, to), step, number == 0);
             }
             self.blend(&mut pass, view);
+            self.handover.after_view(&mut pass, place);
         }
     }
 

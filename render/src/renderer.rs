@@ -6,6 +6,7 @@ use crate::contours::Contours;
 use crate::cutouts::Cutouts;
 use crate::deform::Deformer;
 use crate::draws::{Caches, Draw, Draws};
+use crate::handover::Handover;
 use crate::jobs::Jobs;
 use crate::layouts::Layouts;
 use crate::lighting::Lighting;
@@ -57,6 +58,7 @@ pub struct Renderer {
     targets: Vec<Option<Target>>,
     problems: Problems,
     clock: Clock,
+    handover: Handover,
     frame: u64,
     /// The frame before the last, and the last.
     submitted: [Option<wgpu::SubmissionIndex>; 2],
@@ -98,7 +100,8 @@ impl Renderer {
             view_targets: ViewTargets::default(),
             targets: Vec::new(),
             problems: Problems::default(),
-            clock: Clock::new(device, &gpu.queue),
+            clock: Clock::new(gpu),
+            handover: Handover::new(gpu),
             frame: 0,
             submitted: [None, None],
             samples,
@@ -362,6 +365,7 @@ impl Renderer {
             films: &self.films,
             lighting: self.lighting.group(),
             clock: &self.clock,
+            handover: &self.handover,
             stats,
         };
         recorder.maps(&mut encoder, &self.maps);

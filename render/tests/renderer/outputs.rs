@@ -100,10 +100,13 @@ fn passes_are_timed() {
         stats = renderer.render(&scene, std::slice::from_ref(&picture)).unwrap();
         gpu.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
     }
-    if gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
-        let kinds: Vec<&str> = stats.gpu_s.iter().map(|(k, _)| *k).collect();
+    let kinds: Vec<&str> = stats.gpu_s.iter().map(|(k, _)| *k).collect();
+    // A software device would wait for every pass to tell its time.
+    if gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) && gpu.info.device_type != wgpu::DeviceType::Cpu {
         assert_eq!(kinds, ["shadow maps", "views", "compose"]);
         assert!(stats.gpu_s.iter().all(|(_, s)| (0.0..5.0).contains(s)) && stats.gpu_s[1].1 > 0.0, "{:?}", stats.gpu_s);
+    } else {
+        assert_eq!(kinds, [""; 0]);
     }
     assert!(stats.prepare_s > 0.0 && stats.encode_s > 0.0);
 }
