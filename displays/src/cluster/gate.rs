@@ -2,6 +2,7 @@
 //! releases a frame the moment that the last display is ready, whatever the application does meanwhile.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -64,6 +65,8 @@ pub(super) struct Gate {
     /// Of this process, where they are known.
     lines: Option<Lines>,
     quiet: Quiet,
+    /// What is to be said in the log.
+    log: Vec<Words>,
     pub(super) inputs: Vec<Input>,
     /// By number of the display.
     inboxes: BTreeMap<u64, Inbox<Event>>,
@@ -76,9 +79,53 @@ pub(super) struct Gate {
 /// Held by threads of the network as well.
 pub(super) type SharedGate = Arc<Mutex<Gate>>;
 
+/// Who is at the gate. What is said to the network and to the log meanwhile goes out once others can come in: both may take long, and the
+/// next one may be who looks for the late.
+pub(super) struct Entered<'a>(Option<MutexGuard<'a, Gate>>);
+
 /// A thread that panicked has left nothing half done that the lock could not stand.
-pub(super) fn enter(gate: &Mutex<Gate>) -> MutexGuard<'_, Gate> {
-    gate.lock().unwrap_or_else(PoisonError::into_inner)
+pub(super) fn enter(gate: &Mutex<Gate>) -> Entered<'_> {
+    Entered(Some(gate.lock().unwrap_or_else(PoisonError::into_inner)))
+}
+
+impl Deref for Entered<'_> {
+    type Target = Gate;
+    fn deref(&self) -> &Gate {
+        self.0.as_ref().expect("it is there until it is dropped")
+    }
+}
+
+impl DerefMut for Entered<'_> {
+    fn deref_mut(&mut self) -> &mut Gate {
+        self.0.as_mut().expect("it is there until it is dropped")
+    }
+}
+
+impl Drop for Entered<'_> {
+    fn drop(&mut self) {
+        let Some(mut gate) = self.0.take() else { return };
+        let (outlets, log) = (gate.outlets.clone(), std::mem::take(&mut gate.log));
+        drop(gate);
+        outlets.flush();
+        log.into_iter().for_each(|words| words.tell());
+    }
+}
+
+/// Words for the log.
+enum Words {
+    Info(String),
+    Warn(String),
+    Error(String),
+}
+
+impl Words {
+    fn tell(self) {
+        match self {
+            Words::Info(words) => tracing::info!("{words}"),
+            Words::Warn(words) => tracing::warn!("{words}"),
+            Words::Error(words) => tracing::error!("{words}"),
+        }
+    }
 }
 
 impl Gate {
@@ -105,6 +152,7 @@ impl Gate {
             names: BTreeMap::new(),
             lines,
             quiet: Quiet::default(),
+            log: Vec::new(),
             inputs: Vec::new(),
             inboxes: BTreeMap::new(),
             report: HostReport::default(),
@@ -128,6 +176,8 @@ impl Gate {
 
     /// Is the staged frame still to be published, and may the application go on? If not, its thread is woken when something becomes of it.
     pub(super) fn progress(&mut self) -> (bool, bool) {
+        // The thread that looks for the late may be late itself.
+        self.step(ApplicationEvent::Tick);
         let is_staged = self.staged.is_some();
         let is_through = !is_staged && (self.ahead && !self.is_last || !self.lock.waits());
         self.is_awaited = !is_through;
@@ -170,7 +220,8 @@ impl Gate {
         let is_known = self.hashes.get(&ready.frame);
         if is_known.is_some_and(|hash| *hash != ready.hash) {
             self.report.disagreed += 1;
-            return tracing::error!("display `{name}` is ready with frame {}, but its values differ", ready.frame);
+            let words = format!("display `{name}` is ready with frame {}, but its values differ", ready.frame);
+            return self.log.push(Words::Error(words));
         }
         self.report.agreed += is_known.is_some() as u64;
         let display = DisplayId(ready.display);
@@ -198,7 +249,7 @@ impl Gate {
 
     fn complain(&mut self, words: &str) {
         if self.quiet.is_news(words) {
-            tracing::warn!("{words}");
+            self.log.push(Words::Warn(words.into()));
         }
     }
 
@@ -234,7 +285,7 @@ impl Gate {
     pub(super) fn is_gone(&mut self, number: u64) {
         self.there.remove(&number);
         if let Some(name) = self.names.remove(&number) {
-            tracing::info!("display `{name}` is gone");
+            self.log.push(Words::Info(format!("display `{name}` is gone")));
         }
         self.outlets.neighbours.close(number);
         self.step(ApplicationEvent::Gone(DisplayId(number)));
@@ -289,21 +340,22 @@ impl Gate {
                 }
                 ApplicationAction::Admitted(id) => {
                     let name = self.names.get(&id.0).map_or("?", String::as_str);
-                    tracing::info!("display `{name}` is in the lock from frame {} on", self.lock.frame());
+                    self.log.push(Words::Info(format!("display `{name}` is in the lock from frame {} on", self.lock.frame())));
                 }
                 ApplicationAction::Dropped(id, frame) => {
                     let name = self.names.get(&id.0).cloned().unwrap_or_else(|| "?".into());
-                    tracing::warn!("display `{name}` was late for frame {frame}: the others go on without it");
+                    let words = format!("display `{name}` was late for frame {frame}: the others go on without it");
+                    self.log.push(Words::Warn(words));
                     self.report.dropped += 1;
                 }
                 ApplicationAction::TooSlow { display, times, within_us, took_us } => {
                     let name = self.names.get(&display.0).map_or("?", String::as_str);
                     let (within_s, took_ms) = (within_us as f64 / 1e6, took_us / 1000);
-                    tracing::warn!(
+                    self.log.push(Words::Warn(format!(
                         "display `{name}` was late {times} times in {within_s:.1} s: it needs {took_ms} ms for a frame, and {} ms are \
                          waited; from now on it is waited for less and less often, and shows what it draws in time",
                         self.lock.timeout_us() / 1000
-                    );
+                    )));
                 }
             }
         }

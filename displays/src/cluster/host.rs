@@ -265,8 +265,9 @@ impl Host {
                 }
                 let Some(snapshot) = self.snapshot(graph) else { return self.deferred.push(query) };
                 let mut gate = enter(&self.gate);
-                if gate.joins(join.display, &join.name) {
-                    let at = gate.at(join.display);
+                let at = gate.joins(join.display, &join.name).then(|| gate.at(join.display));
+                drop(gate);
+                if let Some(at) = at {
                     tracing::info!("display `{}`{at} joins at frame {}", join.name, self.publisher.last_frame());
                 }
                 Ok(snapshot)

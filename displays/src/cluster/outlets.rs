@@ -1,5 +1,8 @@
 //! What an application tells all: frames and releases.
 
+use std::collections::VecDeque;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
@@ -19,6 +22,17 @@ pub(super) struct Outlets {
     releases: Publisher<'static>,
     /// Who hears of both down a short line.
     pub(super) neighbours: Neighbours,
+    /// What is still to go over the network, in order.
+    queue: Mutex<VecDeque<Far>>,
+    /// Held by who sends it.
+    sending: Mutex<()>,
+}
+
+/// Something for who is far.
+enum Far {
+    Here(u64, Vec<u8>),
+    Frame(u64, Vec<u8>),
+    Release(u64, Vec<u8>),
 }
 
 /// A packet that is ready to go: itself, where somebody wants it over the network, and where it lies.
@@ -67,24 +81,51 @@ impl Outlets {
             here: declare(HERE, Priority::RealTime)?,
             releases: declare(RELEASE, Priority::RealTime)?,
             neighbours: Neighbours::default(),
+            queue: Mutex::default(),
+            sending: Mutex::default(),
         })
     }
 
+    fn queue(&self) -> MutexGuard<'_, VecDeque<Far>> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A frame, for the next [`Outlets::flush`]; who is near hears of it sooner.
     pub(super) fn send(&self, frame: u64, parcel: Parcel) {
+        let mut queue = self.queue();
         if let Some(whereabouts) = &parcel.whereabouts {
             let bytes = bytes_of(whereabouts);
             self.neighbours.tell(Word::Here, &bytes);
-            warn(self.here.put(bytes).wait(), "frame", frame);
+            queue.push_back(Far::Here(frame, bytes));
         }
         if !parcel.packet.is_empty() {
-            warn(self.frames.put(parcel.packet).wait(), "frame", frame);
+            queue.push_back(Far::Frame(frame, parcel.packet));
         }
     }
 
+    /// A release, for the next [`Outlets::flush`]; who is near hears of it sooner.
     pub(super) fn release(&self, release: &Release) {
         let bytes = bytes_of(release);
         self.neighbours.tell(Word::Release, &bytes);
-        warn(self.releases.put(bytes).wait(), "release of frame", release.frame);
+        self.queue().push_back(Far::Release(release.frame, bytes));
+    }
+
+    /// Sends what is to go over the network, which may take a while on a busy machine. Where another thread does that already, it sends all.
+    pub(super) fn flush(&self) {
+        while !self.queue().is_empty()
+            && let Ok(_sending) = self.sending.try_lock()
+        {
+            loop {
+                // Not held while it is sent.
+                let next = self.queue().pop_front();
+                match next {
+                    Some(Far::Here(frame, bytes)) => warn(self.here.put(bytes).wait(), "frame", frame),
+                    Some(Far::Frame(frame, bytes)) => warn(self.frames.put(bytes).wait(), "frame", frame),
+                    Some(Far::Release(frame, bytes)) => warn(self.releases.put(bytes).wait(), "release of frame", frame),
+                    None => break,
+                }
+            }
+        }
     }
 }
 
