@@ -218,6 +218,10 @@ pub(crate) struct ShadowError {
     /// Rays per pixel and axis
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) sub_samples: u32,
+    /// The same beside edges and along thin shadows, which are followed; at most --sub-samples for none. Scene files say their own
+    /// rays
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(0..=32), conflicts_with = "scene")]
+    pub(crate) fine_sub_samples: u32,
     /// Score against this mask (grey PNG: 0 background, 1 lit, 2 shadow, 3 away, 4 outside the cone, 255 edge) instead of
     /// tracing
     #[arg(long)]

@@ -139,6 +139,7 @@ impl SceneJson {
         let defaults = TraceOptions::default();
         let options = TraceOptions {
             sub_samples: within("ss", self.ss.unwrap_or(defaults.sub_samples), 1, 64)?,
+            fine_sub_samples: defaults.fine_sub_samples,
             graze: within("graze", self.graze.unwrap_or(defaults.graze), -1.0, 1.0)?,
             eps_scale: within("eps", self.eps.unwrap_or(defaults.eps_scale), 0.0, 1.0)?,
             cull: self.cull.unwrap_or(defaults.cull),

@@ -155,7 +155,7 @@ fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
             casting.or(lights.iter().position(|l| l.shines)).ok_or("the world has no light that is on")?
         }
     };
-    let options = world_options(args.sub_samples);
+    let options = world_options(args);
     let problems = session.problems();
     let mut scene = std::mem::take(session.scene_mut());
     // The tracer knows no lists of lights.
@@ -167,8 +167,9 @@ fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
 }
 
 /// A world may be a kilometre wide, and its lamps stand centimetres from what casts: rays start close to surfaces.
-fn world_options(sub_samples: u32) -> TraceOptions {
-    TraceOptions { sub_samples, eps_scale: CLOSE, ..TraceOptions::default() }
+fn world_options(args: &ShadowError) -> TraceOptions {
+    let (sub_samples, fine_sub_samples) = (args.sub_samples, args.fine_sub_samples);
+    TraceOptions { sub_samples, fine_sub_samples, eps_scale: CLOSE, ..TraceOptions::default() }
 }
 
 /// The models of a scene file, with its light alone.

@@ -33,7 +33,7 @@ pub(super) fn run(folder: &Path, args: &ShadowError) -> Result<usize, Failure> {
     let bar = progress(files.len() as u32, "models");
     for file in &files {
         let name = file.strip_prefix(folder).unwrap_or(file).display();
-        match placed(file, args.time, (size, args.sub_samples)) {
+        match placed(file, size, args) {
             Err(error) => {
                 problems.insert(format!("{name}: {error}"));
             }
@@ -96,7 +96,8 @@ fn models_below(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
 }
 
 /// A model on its floor at a time, without lights, and the box around it.
-fn placed(file: &Path, time_s: f64, (size, sub_samples): ([u32; 2], u32)) -> Result<(Subject, Aabb), Failure> {
+fn placed(file: &Path, size: [u32; 2], args: &ShadowError) -> Result<(Subject, Aabb), Failure> {
+    let time_s = args.time;
     let mut world = World::new();
     let bounds = model::show(world.graph_mut(), file)?;
     if time_s > 0.0 {
@@ -111,7 +112,7 @@ fn placed(file: &Path, time_s: f64, (size, sub_samples): ([u32; 2], u32)) -> Res
     let found = Rig::new().pictures(world.graph(), extractor.viewpoints(), &bounds, &wanted)?;
     let view = found.pictures.into_iter().flat_map(|p| p.views).next().ok_or("there is nothing to see it from")?;
     let view = View { size, frustum: widened(view.frustum), ..view };
-    Ok((Subject { scene, light: 0, view, options: world_options(sub_samples), problems }, bounds))
+    Ok((Subject { scene, light: 0, view, options: world_options(args), problems }, bounds))
 }
 
 /// The camera takes in the model; the floor beside it, where the shadow lies, is seen too.

@@ -7,6 +7,7 @@ mod alpha;
 mod area;
 mod beam;
 mod camera;
+mod fine;
 mod mask;
 mod ray;
 mod triangles;
@@ -28,6 +29,9 @@ use triangles::Soup;
 pub struct TraceOptions {
     /// Rays per pixel along each axis; where they disagree the pixel is [`Mask::MIXED`]. At least 1.
     pub sub_samples: u32,
+    /// The same where a pixel may show what is thinner than its rays are apart: beside edges, and along what is found there.
+    /// At most `sub_samples` for none.
+    pub fine_sub_samples: u32,
     /// Surfaces whose cosine towards the light is at most this are [`Mask::AWAY`].
     pub graze: f64,
     /// Distance of a shadow ray's start from its surface, as a share of the diagonal of the scene's bounds.
@@ -40,7 +44,7 @@ pub struct TraceOptions {
 
 impl Default for TraceOptions {
     fn default() -> TraceOptions {
-        TraceOptions { sub_samples: 4, graze: 0.03, eps_scale: 1e-5, cull: true, blend_casts: true }
+        TraceOptions { sub_samples: 4, fine_sub_samples: 0, graze: 0.03, eps_scale: 1e-5, cull: true, blend_casts: true }
     }
 }
 
@@ -111,6 +115,10 @@ impl Tracer {
         let [width, height] = view.size;
         let mut mask = Mask::background(width, height);
         by_rows(&mut mask.classes, width, progress, |pixel| self.pixel(&camera, pixel, &beam, options));
+        if options.fine_sub_samples > options.sub_samples {
+            let camera = Camera::new(view, options.fine_sub_samples)?;
+            fine::refine(&mut mask, |pixel| self.pixel(&camera, pixel, &beam, options));
+        }
         Ok(mask)
     }
 

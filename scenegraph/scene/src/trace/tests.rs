@@ -393,3 +393,22 @@ fn a_straight_edge_hides_the_segment_of_the_disc() {
     assert_eq!(shares.visibility(), [0, 0, 128, 255]);
     assert!(shares.score(&[0; 3]).is_err());
 }
+
+/// A wire of a hundredth of a pixel and its shadow pass between sixteen rays here and there, but not between those of a pixel that
+/// lies beside one where they were met.
+#[test]
+fn wires_are_followed_where_rays_are_too_far_apart() {
+    let wire = drawable(sphere(8), Mat4::from_translation(vec3(0.0, 1.0, 0.0)) * Mat4::from_scale(vec3(4.0, 0.0005, 0.0005)));
+    let world = Scene { lights: vec![sun(vec3(0.05, -1.0, 0.3))], ..scene(vec![ground(6.0), wire]) };
+    let view = view(vec3(0.3, 7.0, 6.0), Vec3::ZERO, [64, 48]);
+    let mask = |fine_sub_samples| {
+        let options = TraceOptions { fine_sub_samples, ..TraceOptions::default() };
+        trace_visibility(&world, 0, &view, &options).unwrap()
+    };
+    let [plain, same, fine] = [0, 4, 24].map(mask);
+    assert_eq!(plain, same);
+    assert!(plain.classes.iter().zip(&fine.classes).all(|(plain, fine)| fine == plain || *fine == Mask::MIXED));
+    let counts = [&plain, &fine].map(|m| m.count(Mask::MIXED));
+    assert!(counts[1] >= counts[0] + 20, "{counts:?}");
+    assert_eq!(fine, mask(24));
+}
