@@ -69,7 +69,8 @@ mod tests {
     #[test]
     fn thin_shadows_are_followed_from_where_they_were_met() {
         // What few rays find, what many would find, the result, and how many pixels are asked again.
-        let rows: [([&str; 4], [&str; 4], [&str; 4], usize); 5] = [
+        type Rows = [&'static str; 4];
+        let rows: [(Rows, Rows, Rows, usize); 5] = [
             // A wire that one pixel found, and one that none did.
             (
                 ["......", "?.....", "......", "......"],
