@@ -99,6 +99,17 @@ fn holes_are_exact() {
         (d.mesh, d.pose) = (mesh.clone(), Some(pose.clone()));
         d.bounds_in_world = Aabb { min: d.bounds_in_world.min - half, max: d.bounds_in_world.max + half };
     }
+    // One that hangs on two joints, of which the second moved.
+    let mut hung = cards(5, leaf(), Vec3::ONE);
+    let mut mesh = plane(1.0);
+    mesh.joints = vec![[0, 1, 0, 0]; 4].into();
+    mesh.weights = [0.0, 1.0, 0.6, 0.2].map(|w| Vec4::new(1.0 - w, w, 0.0, 0.0)).into();
+    let moved = Mat4::from_rotation_translation(Quat::from_rotation_z(0.7), Vec3::new(0.1, 0.35, 0.2));
+    let (mesh, pose) = (Arc::new(mesh), Arc::new(Pose { object_from_bind: vec![Mat4::IDENTITY, moved], morph_weights: vec![] }));
+    for d in hung.iter_mut().take(5) {
+        (d.mesh, d.pose) = (mesh.clone(), Some(pose.clone()));
+        d.bounds_in_world = Aabb { min: d.bounds_in_world.min - half, max: d.bounds_in_world.max + half };
+    }
     let fence = |times, wrap| {
         let upright = at(0.0, 0.6, 0.0) * Mat4::from_rotation_x(1.5) * Mat4::from_scale(Vec3::new(3.0, 1.0, 1.2));
         vec![shape(plane(1.0), net(times, wrap), upright), ground(30.0)]
@@ -121,6 +132,7 @@ fn holes_are_exact() {
         ("texels", cards(6, nearest, Vec3::ONE), lamp(), far, half),
         ("faded", faded, sun(), far, half),
         ("bent", bent, sun(), far, half),
+        ("hung_on_joints", hung, lamp(), far, half),
         ("short", cards(6, leaf(), Vec3::ONE), short, far, half),
     ];
     let mut shooter = Shooter::new();
