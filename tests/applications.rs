@@ -48,16 +48,19 @@ on_frame(|t, dt| {
 fn applications_share_a_world_and_locks_of_the_dead_expire() {
     let (folder, address) = prepare("applications", &[("host.rhai", HOST), ("first.rhai", FIRST), ("second.rhai", SECOND)]);
     let path = |file: &str| folder.join(file).to_string_lossy().into_owned();
-    let host = Process::start(&["serve", &path("host.rhai"), "--listen", &address]);
-    let mut first = Process::start(&["join", &path("first.rhai"), "--connect", &address]);
+    // Who is dead is known by its line, which the system closes; a busy machine alone gives nobody up.
+    let [lease, most] = ["--lease-ms", "60000"];
+    let host = Process::start(&["serve", &path("host.rhai"), "--listen", &address, lease, most]);
+    let joins = |script: &str| Process::start(&["join", &path(script), "--connect", &address, lease, most]);
+    let mut first = joins("first.rhai");
     first.says("first: true");
     host.says(r#"world ["ball", "first_box"] ball 1"#);
-    let mut second = Process::start(&["join", &path("second.rhai"), "--connect", &address]);
+    let mut second = joins("second.rhai");
     second.says("not written: `translation` of `first_box` (Transform): it belongs to `first`");
     second.says("not put: `children` of `ball` (Transform): `first` has locked it");
     second.says("second: `first` has locked it");
     // Its name is taken.
-    let mut twin = Process::start(&["join", &path("second.rhai"), "--connect", &address]);
+    let mut twin = joins("second.rhai");
     first.child.kill().unwrap();
     second.says("second has it");
     host.says(r#"world ["ball", "first_box", "second_box"] ball 2.0 box 3.0"#);

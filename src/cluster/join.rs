@@ -23,7 +23,7 @@ pub(crate) fn join(args: &cli::Join) -> Result<usize, Failure> {
     let stem = || args.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let name = args.name.clone().unwrap_or_else(stem);
     let keeps = args.on_leave == OnLeave::Keep;
-    let mut guest = Guest::connect(&args.connect, &security(&args.link), &name, keeps, shared_graph)?;
+    let mut guest = Guest::connect(&args.connect, &security(&args.link), args.link.lease(), &name, keeps, shared_graph)?;
     let interrupt = Interrupt::watch()?;
     let console = Console::open(args.console);
     let started = Instant::now();

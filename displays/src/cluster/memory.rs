@@ -9,8 +9,13 @@ use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom, Write};
 
 use serde::{Deserialize, Serialize};
 
-/// So many packets lie there at once: the one that is read, the one that follows, and two for who is late.
-const PLACES: u64 = 4;
+/// So many packets lie there at the least: the one that is read, the one that follows, and two for who is late.
+const FEWEST_PLACES: u64 = 4;
+/// And at the most, where they are small: a display that draws for seconds, as it does first of all, finds all that came meanwhile. Without
+/// them it would fetch everything anew, and draw for seconds again.
+const MOST_PLACES: u64 = 512;
+/// More places than the fewest take no more than this, so that large packets stay in the processor's caches.
+const ROOM_BYTES: u64 = 2 << 20;
 /// Before the places: the token, and the number of the last packet whose place may be written anew.
 const HEAD: u64 = 16;
 /// Where the first place begins; places are whole pages.
@@ -40,6 +45,7 @@ pub(super) struct Shelf {
     /// Packets up to this one may be gone.
     gone: u64,
     place_bytes: u64,
+    places: u64,
 }
 
 impl Shelf {
@@ -48,7 +54,7 @@ impl Shelf {
     /// # Errors
     /// The system has none to share.
     pub(super) fn make() -> Result<Shelf> {
-        Ok(Shelf { file: nameless()?, token: fastrand::u64(1..), number: 0, gone: 0, place_bytes: 0 })
+        Ok(Shelf { file: nameless()?, token: fastrand::u64(1..), number: 0, gone: 0, place_bytes: 0, places: MOST_PLACES })
     }
 
     /// What tells it from others.
@@ -62,17 +68,18 @@ impl Shelf {
     /// There is no more memory.
     pub(super) fn put(&mut self, packet: &[u8]) -> Result<Whereabouts> {
         self.number += 1;
-        self.gone = self.gone.max(self.number.saturating_sub(PLACES));
+        self.gone = self.gone.max(self.number.saturating_sub(self.places));
         let length = packet.len() as u64;
         if length > self.place_bytes {
             // All places move.
             self.place_bytes = (length + length / 4).next_multiple_of(PAGE);
+            self.places = (ROOM_BYTES / self.place_bytes).clamp(FEWEST_PLACES, MOST_PLACES);
             self.gone = self.number - 1;
         }
         let head = [self.token.to_le_bytes(), self.gone.to_le_bytes()].concat();
         // Who reads what is about to be written over finds that out afterwards.
         write_at(&self.file, 0, &head)?;
-        let at = PAGE + self.number % PLACES * self.place_bytes;
+        let at = PAGE + self.number % self.places * self.place_bytes;
         write_at(&self.file, at, packet)?;
         let (process, file) = (std::process::id(), descriptor(&self.file));
         Ok(Whereabouts { process, file, token: self.token, number: self.number, at, length })
@@ -193,26 +200,33 @@ fn open(_: &Whereabouts) -> Result<File> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn packets_are_read_until_their_place_is_written_anew() {
+    /// Of packets of a length, so many can be read after each that was put.
+    fn check(length: usize, places: u64) {
         let mut shelf = Shelf::make().unwrap();
         let mut reader = Reader::default();
-        let packet = |number: u64| vec![number as u8; 3000 + number as usize];
+        let packet = |number: u64| vec![number as u8; length];
         let mut put: Vec<Whereabouts> = Vec::new();
-        for number in 0..20u64 {
+        for number in 0..places + 3 {
             put.push(shelf.put(&packet(number)).unwrap());
-            for (other, whereabouts) in put.iter().enumerate() {
-                let is_there = other as u64 + PLACES > number;
-                let expected = if is_there { Found::Packet(packet(other as u64)) } else { Found::Gone };
-                assert_eq!(reader.read(whereabouts), expected, "{other} after {number}");
+            let others = [0, 1, 2, number.saturating_sub(places), (number + 1).saturating_sub(places), number];
+            for other in others.into_iter().filter(|other| *other <= number) {
+                let is_there = other + places > number;
+                let expected = if is_there { Found::Packet(packet(other)) } else { Found::Gone };
+                assert_eq!(reader.read(&put[other as usize]), expected, "{other} after {number}");
             }
         }
-        // A longer one moves all places.
-        let longer = shelf.put(&[7; 10_000]).unwrap();
-        assert_eq!(reader.read(&put[19]), Found::Gone);
-        assert_eq!(reader.read(&longer), Found::Packet(vec![7; 10_000]));
+        // A packet that is longer than all before, and one after it.
+        let longer = shelf.put(&vec![7; 2 * length + 10_000]).unwrap();
+        assert_eq!(reader.read(put.last().unwrap()), Found::Gone);
+        assert_eq!(reader.read(&longer), Found::Packet(vec![7; 2 * length + 10_000]));
         let after = shelf.put(&[8; 3]).unwrap();
-        assert_eq!((reader.read(&longer), reader.read(&after)), (Found::Packet(vec![7; 10_000]), Found::Packet(vec![8; 3])));
+        assert_eq!(reader.read(&longer), Found::Packet(vec![7; 2 * length + 10_000]));
+        assert_eq!(reader.read(&after), Found::Packet(vec![8; 3]));
+    }
+
+    #[test]
+    fn packets_are_read_until_their_place_is_written_anew() {
+        [(10, 512), (3000, 512), (30_000, 51), (600_000, 4)].into_iter().for_each(|(length, places)| check(length, places));
     }
 
     #[test]

@@ -17,7 +17,7 @@ use crate::cluster::message::{
 };
 use crate::cluster::ordered::Outbox;
 use crate::cluster::transport::{End, network};
-use crate::cluster::{ClusterError, LEASE, Security};
+use crate::cluster::{ClusterError, Security};
 
 /// What is not confirmed after so long is sent again.
 const RESEND: Duration = Duration::from_millis(500);
@@ -103,17 +103,18 @@ pub struct Guest {
 }
 
 impl Guest {
-    /// Joins the host at an address, now or as soon as it is there. `keeps` says whether its nodes stay when it leaves,
+    /// Joins the host at an address, now or as soon as it is there. A link without a sign of life for `lease` is broken; `keeps` says whether its nodes stay when it leaves,
     /// `fresh` makes graphs for its world, with no nodes but a Group `world`.
     pub fn connect(
         endpoint: &str,
         security: &Security,
+        lease: Duration,
         name: &str,
         keeps: bool,
         fresh: fn() -> Graph,
     ) -> Result<Guest, ClusterError> {
         let subject = (WORD, Arrived::Word as fn(Vec<u8>) -> Arrived);
-        let link = Link { end: End::Guest, endpoint, security, lease: LEASE, uses_memory: true, cache: None };
+        let link = Link { end: End::Guest, endpoint, security, lease, uses_memory: true, cache: None };
         let mut line = Line::open(link, Arrived::Frame, subject, Arrived::Host)?;
         let deeds = line.session.declare_publisher(DEEDS).congestion_control(CongestionControl::Block).wait().map_err(network)?;
         line.announce(GUEST)?;
