@@ -9,10 +9,10 @@ use crate::plan::{BLACK_FILM, Purpose};
 use crate::slots::Slots;
 use crate::stats::Problems;
 use crate::uniforms;
-use crate::volumes::{Cone, Seen, Surface, VolumeCaster, VolumeJob, VolumeLight};
+use crate::volumes::{Cone, Seen, Surface, TurnedBox, VolumeCaster, VolumeJob, VolumeLight};
 use glam::{Mat4, Vec3, Vec4};
 use umbriel_scene::{
-    Aabb, AlphaMode, Light, LightKind, Material, Mesh, Scene, ShadowMethod, StencilGroup, StencilMode, Topology,
+    Aabb, AlphaMode, Drawable, Light, LightKind, Material, Mesh, Scene, ShadowMethod, StencilGroup, StencilMode, Topology,
 };
 
 /// All jobs of the frame.
@@ -130,6 +130,14 @@ pub(crate) fn receivers(drawables: impl Iterator<Item = usize>, scene: &Scene) -
     all
 }
 
+/// Box around a drawable, as small as is known.
+fn bounds_of(drawable: &Drawable, is_deformed: bool) -> TurnedBox {
+    if is_deformed || drawable.bounds_in_world.is_empty() || drawable.mesh.bounds.is_empty() {
+        return TurnedBox::straight(drawable.bounds_in_world);
+    }
+    TurnedBox::of(&drawable.mesh.bounds, &drawable.world_from_object)
+}
+
 /// What is known of the surfaces that a view shows; none where a receiver has no bounds.
 pub(crate) fn seen(drawables: impl Iterator<Item = usize>, scene: &Scene, view_from_world: &Mat4) -> Option<Seen> {
     let eye = view_from_world.inverse().w_axis.truncate();
@@ -140,7 +148,7 @@ pub(crate) fn seen(drawables: impl Iterator<Item = usize>, scene: &Scene, view_f
             if d.bounds_in_world.is_empty() {
                 return None;
             }
-            seen.receivers.push(d.bounds_in_world);
+            seen.receivers.push(bounds_of(d, d.pose.is_some()));
         }
         let is_whole = d.material.alpha == AlphaMode::Opaque && d.material.shader.is_none() && d.pose.is_none();
         if is_whole && d.mesh.topology == Topology::Triangles && d.mesh.triangle_count() <= MOST_HIDING {
@@ -169,7 +177,7 @@ impl Things<'_> {
             positions: deformed.map_or(&rest.positions, |d| &d.positions).clone(),
             positions_revision: deformed.map_or(0, |d| d.revision),
             world_from_object: drawable.world_from_object,
-            bounds_in_world: drawable.bounds_in_world,
+            bounds: bounds_of(drawable, deformed.is_some()),
             surface: match drawable.material.alpha {
                 AlphaMode::Opaque if drawable.material.double_sided => Surface::BothSides,
                 AlphaMode::Opaque if deformed.is_none() => Surface::Front,
@@ -190,7 +198,7 @@ impl Things<'_> {
             triangle_count: rest.index_count / 3,
             material: self.materials.get(material)?.group.clone(),
             world_from_object: drawable.world_from_object,
-            bounds_in_world: drawable.bounds_in_world,
+            bounds: bounds_of(drawable, deformed.is_some()),
         })
     }
 }

@@ -13,7 +13,7 @@
 mod pipeline;
 
 use crate::slots::Slots;
-use crate::volumes::{Extent, Sight, VolumeLight};
+use crate::volumes::{Extent, Sight, TurnedBox, VolumeLight};
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec4};
 use pipeline::{CORNERS, Pipeline};
@@ -40,7 +40,7 @@ pub(crate) struct Cutout {
     /// Its material's group 2.
     pub(crate) material: wgpu::BindGroup,
     pub(crate) world_from_object: Mat4,
-    pub(crate) bounds_in_world: Aabb,
+    pub(crate) bounds: TurnedBox,
 }
 
 /// What cuts holes into the shadow of one light or group.
@@ -87,7 +87,7 @@ impl Cutouts {
         for CutoutJob { light, receivers, cutouts } in jobs {
             let mut prepared = Vec::new();
             for cutout in cutouts {
-                let Some(extent) = Extent::new(light, &cutout.bounds_in_world, receivers) else { continue };
+                let Some(extent) = Extent::new(light, &cutout.bounds, receivers) else { continue };
                 let slot = self.uniforms.push(&Uniform {
                     world_from_object: cutout.world_from_object,
                     toward_light: light.toward_light,

@@ -15,7 +15,7 @@ pub(super) fn distribute(light: &VolumeLight, size: f32, casters: Vec<VolumeCast
     let mut outlines = vec![Vec::new()];
     let mut layers = vec![Vec::new()];
     for caster in casters {
-        let layer = place(&mut outlines, Outline::new(light, &caster.bounds_in_world), size);
+        let layer = place(&mut outlines, Outline::new(light, &caster.bounds.in_world), size);
         layers.resize_with(outlines.len(), Vec::new);
         layers[layer].push(caster);
     }

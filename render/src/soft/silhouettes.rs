@@ -149,7 +149,7 @@ fn items(device: &wgpu::Device, volumes: &mut VolumePass, light: &VolumeLight, c
     for caster in casters.iter().filter(|c| c.positions.size() >= 12 * c.mesh.positions.len() as u64) {
         for part in volumes.parts(device, &caster.mesh) {
             items.push(Item {
-                uniform: CasterUniform::new(light, caster.world_from_object, &caster.bounds_in_world, part),
+                uniform: CasterUniform::new(light, caster.world_from_object, &caster.bounds.in_world, part),
                 part: part.clone(),
                 positions: caster.positions.clone(),
                 positions_revision: caster.positions_revision,

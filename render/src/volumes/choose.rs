@@ -21,7 +21,7 @@
 
 use super::reach::{self, Reach};
 use super::tiles::{Seen, Tiles};
-use super::{Surface, VolumeLight, hull};
+use super::{Surface, TurnedBox, VolumeLight, hull};
 use glam::{DMat4, DVec3, DVec4};
 use std::cell::OnceCell;
 use umbriel_scene::{Aabb, View, VolumeCounting};
@@ -54,7 +54,9 @@ pub(super) struct Watch<'a> {
     light: &'a VolumeLight,
     /// Near rectangle and light.
     between: Vec<DVec4>,
-    axes: Vec<DVec3>,
+    /// Normals of the faces of their hull, and along its edges.
+    normals: Vec<DVec3>,
+    edges: Vec<DVec3>,
     /// Where light may fall on receivers that are seen.
     lit: Aabb,
     pub(super) scissor: Option<Scissor>,
@@ -157,10 +159,9 @@ impl<'a> Watch<'a> {
         between.push(toward);
         let across = [near[1] - near[0], near[3] - near[0]].map(DVec4::truncate);
         let up: Vec<DVec3> = near.iter().map(|n| toward.truncate() - n.truncate() * toward.w).collect();
-        let mut axes = vec![across[0].cross(across[1])];
-        axes.extend((0..4).map(|i| (near[(i + 1) % 4] - near[i]).truncate().cross(up[i])));
-        axes.extend(DVec3::AXES);
-        axes.extend(across.iter().chain(&up).flat_map(|edge| DVec3::AXES.map(|axis| edge.cross(axis))));
+        let mut normals = vec![across[0].cross(across[1])];
+        normals.extend((0..4).map(|i| (near[(i + 1) % 4] - near[i]).truncate().cross(up[i])));
+        let edges = across.into_iter().chain(up).collect();
         let everything = Aabb { min: glam::Vec3::NEG_INFINITY, max: glam::Vec3::INFINITY };
         let receivers = if sight.receivers.is_empty() { everything } else { sight.receivers };
         let lit = common(&receivers, &light.bounds());
@@ -170,30 +171,31 @@ impl<'a> Watch<'a> {
             true if bounded => sight.pixels(&lit),
             _ => Some(sight.whole()),
         };
-        Watch { sight, light, between, axes, lit, scissor }
+        Watch { sight, light, between, normals, edges, lit, scissor }
     }
 
     /// How a caster with these bounds is counted; `None` where the view shows nothing of its shadow.
-    pub(super) fn choose(&self, bounds: &Aabb, surface: Surface, reach: &Reach) -> Option<Choice> {
+    pub(super) fn choose(&self, bounds: &TurnedBox, surface: Surface, reach: &Reach) -> Option<Choice> {
         let sight = self.sight;
         let all = Choice { z_fail: true, near_caps: true, front_hides: false, far_caps: true, scissor: self.scissor? };
-        if bounds.is_empty() {
+        if bounds.in_world.is_empty() {
             return Some(all);
         }
-        let corners = hull::corners(bounds);
+        let (corners, normals) = (bounds.corners, bounds.normals());
         let toward = self.light.toward_light.as_dvec4();
         let volume = reach::swept(&corners, toward, reach);
         let margin = hull::margin(&volume) + hull::margin(&sight.near_rectangle);
         let culls = self.light.settings.culling;
         if culls
-            && (self.light.misses(bounds)
+            && (self.light.misses(&bounds.in_world)
                 || sight.is_outside(&volume, margin)
                 || hull::planes(&self.lit).iter().any(|p| p.is_finite() && hull::is_behind(&volume, *p, margin)))
         {
             return None;
         }
+        let products = || self.edges.iter().flat_map(|edge| bounds.edges.map(|other| edge.cross(other)));
         let is_safe = self.light.settings.counting == VolumeCounting::Auto
-            && hull::are_apart(&self.between, &corners, self.axes.iter().copied(), margin);
+            && hull::are_apart(&self.between, &corners, self.normals.iter().copied().chain(normals).chain(products()), margin);
         // Under parallel light without end the far cap is a point, whatever else is asked for.
         let has_far_cap = toward.w != 0.0 || reach.has_end();
         let mut choice = Choice { z_fail: !is_safe, far_caps: has_far_cap, ..all };
@@ -215,8 +217,10 @@ impl<'a> Watch<'a> {
         if self.light.settings.depth_bounds
             && let Some(tiles) = sight.tiles()
         {
-            let along = toward.truncate() - bounds.centre().as_dvec3() * toward.w;
-            let axes = DVec3::AXES.map(|axis| along.cross(axis));
+            let along = toward.truncate() - bounds.in_world.centre().as_dvec3() * toward.w;
+            let is_straight = bounds.edges == DVec3::AXES;
+            let axes = bounds.edges.map(|edge| along.cross(edge)).into_iter().chain(normals.into_iter().filter(|_| !is_straight));
+            let axes: Vec<DVec3> = axes.collect();
             choice.scissor = tiles.touched(&volume, &axes, choice.scissor, margin)?;
         }
         Some(choice)

@@ -2,21 +2,21 @@
 
 use super::choose::{Sight, Watch};
 use super::reach::{self, Reach};
-use super::{Surface, VolumeLight};
+use super::{Surface, TurnedBox, VolumeLight};
 use umbriel_scene::Aabb;
 
 /// How far a caster's shadow may fall.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extent {
-    bounds: Aabb,
+    bounds: TurnedBox,
     reach: Reach,
 }
 
 impl Extent {
     /// `None` where it falls on nothing that receives.
-    pub(crate) fn new(light: &VolumeLight, bounds_in_world: &Aabb, receivers: &Aabb) -> Option<Extent> {
-        let reach = reach::reach(light, bounds_in_world, receivers)?;
-        Some(Extent { bounds: *bounds_in_world, reach })
+    pub(crate) fn new(light: &VolumeLight, bounds: &TurnedBox, receivers: &Aabb) -> Option<Extent> {
+        let reach = reach::reach(light, bounds, receivers)?;
+        Some(Extent { bounds: *bounds, reach })
     }
 
     /// 1 / how far it is thrown, as in volumes/thrown.wgsl.

@@ -27,12 +27,14 @@ mod layers;
 mod parts;
 mod reach;
 mod tiles;
+mod turned;
 
 pub(crate) use cache::GpuPart;
 pub use choose::Sight;
 pub(crate) use extent::Extent;
 pub(crate) use extract::CasterUniform;
 pub use tiles::Seen;
+pub use turned::TurnedBox;
 
 use choose::Watch;
 use extract::{Lists, Stale, Wanted};
@@ -85,8 +87,8 @@ pub struct VolumeCaster {
     pub positions_revision: u64,
     /// Where it is. A mirroring matrix is fine.
     pub world_from_object: Mat4,
-    /// Box around it in the world, deformation included; [`Aabb::EMPTY`] where unknown (slower, and as exact).
-    pub bounds_in_world: Aabb,
+    /// Box around it, deformation included.
+    pub bounds: TurnedBox,
     /// What of it is seen.
     pub surface: Surface,
 }
@@ -162,7 +164,7 @@ pub struct VolumePass {
 struct Prepared {
     light: Option<VolumeLight>,
     /// Bounds, surface and reach of each caster that is drawn.
-    casters: Vec<(Aabb, Surface, Reach)>,
+    casters: Vec<(TurnedBox, Surface, Reach)>,
     lists: Vec<Lists>,
 }
 
@@ -198,7 +200,7 @@ impl VolumePass {
             let mut old = OldLists::new(old_jobs.next().unwrap_or_default().lists);
             let mut prepared = Prepared { light: Some(job.light), ..Prepared::default() };
             for caster in &job.casters {
-                let Some(reach) = reach::reach(&job.light, &caster.bounds_in_world, &job.receivers) else {
+                let Some(reach) = reach::reach(&job.light, &caster.bounds, &job.receivers) else {
                     stats.without_receiver += 1;
                     continue;
                 };
@@ -215,7 +217,7 @@ impl VolumePass {
                         positions: &caster.positions,
                         positions_revision: caster.positions_revision,
                         world_from_object: caster.world_from_object,
-                        bounds_in_world: &caster.bounds_in_world,
+                        bounds_in_world: &caster.bounds.in_world,
                         reach_w: reach.w(),
                     };
                     stats.may_wrap += usize::from(part.layers > parts::GROUP_LAYERS);
@@ -235,7 +237,7 @@ impl VolumePass {
                     }
                     prepared.lists.push(made);
                 }
-                prepared.casters.push((caster.bounds_in_world, caster.surface, reach));
+                prepared.casters.push((caster.bounds, caster.surface, reach));
             }
             self.jobs.push(prepared);
         }

@@ -1,6 +1,6 @@
 //! How far volumes are thrown: to infinity (002), or until nothing is left that could receive.
 
-use super::{VolumeLight, hull};
+use super::{TurnedBox, VolumeLight, hull};
 use glam::{DVec3, DVec4};
 use umbriel_scene::Aabb;
 
@@ -37,12 +37,12 @@ impl Reach {
 /// An end is behind a plane for all of the caster once the corner of its box that is last to cross has crossed. Ends lie
 /// where that happens first: behind one of the planes around all receivers or the light's lower plane (sea level, 001
 /// section 5.2), beyond the range of a lamp (against ghost shadows, 002), or at the length that the author set.
-pub(super) fn reach(light: &VolumeLight, bounds: &Aabb, receivers: &Aabb) -> Option<Reach> {
-    if bounds.is_empty() {
+pub(super) fn reach(light: &VolumeLight, bounds: &TurnedBox, receivers: &Aabb) -> Option<Reach> {
+    if bounds.in_world.is_empty() {
         return Some(Reach::INFINITE);
     }
-    let corners = hull::corners(bounds);
-    let margin = hull::margin(&corners) + 1e-3 * f64::from(bounds.radius());
+    let corners = bounds.corners;
+    let margin = hull::margin(&corners) + 1e-3 * f64::from(bounds.in_world.radius());
     let toward = light.toward_light.as_dvec4();
     let settings = &light.settings;
     let mut found = Reach::INFINITE;
@@ -64,7 +64,7 @@ pub(super) fn reach(light: &VolumeLight, bounds: &Aabb, receivers: &Aabb) -> Opt
         }
         end(times * (1.0 + 1e-5), is_soft.then_some(plane));
     }
-    let nearest = distance(bounds, toward.truncate());
+    let nearest = distance(&bounds.in_world, toward.truncate());
     if toward.w != 0.0 && light.range.is_finite() {
         let range = f64::from(light.range);
         if nearest > range {
@@ -157,7 +157,7 @@ mod tests {
             ("lamp below, up to the ceiling", lamp(0.0), inf, wide, Some(10.0 / 4.0), true),
             ("lamp under the sea", lamp(-1.0), inf, sea, Some(f64::INFINITY), false),
         ];
-        let bounds = Aabb { min: Vec3::new(-1.0, 4.0, -1.0), max: Vec3::new(1.0, 6.0, 1.0) };
+        let bounds = TurnedBox::straight(Aabb { min: Vec3::new(-1.0, 4.0, -1.0), max: Vec3::new(1.0, 6.0, 1.0) });
         let receivers = Aabb { min: Vec3::new(-10.0, -1.0, -10.0), max: Vec3::splat(10.0) };
         for (name, toward_light, range, settings, expected, is_soft) in rows {
             let light = VolumeLight { toward_light, range, cone: None, settings };
@@ -170,11 +170,11 @@ mod tests {
         // Nothing receives what is thrown upward from the top of the world, or sideways out of it.
         for toward_light in [sun(0.0, -1.0), lamp(0.0), sun(-1.0, -1.0)] {
             let light = VolumeLight { toward_light, range: inf, cone: None, settings: wide };
-            let above = Aabb { min: Vec3::new(-1.0, 14.0, -1.0), max: Vec3::new(1.0, 16.0, 1.0) };
+            let above = TurnedBox::straight(Aabb { min: Vec3::new(-1.0, 14.0, -1.0), max: Vec3::new(1.0, 16.0, 1.0) });
             assert_eq!(reach(&light, &above, &receivers), None, "{toward_light}");
         }
         let light = VolumeLight { toward_light: sun(0.0, 1.0), range: inf, cone: None, settings: wide };
-        assert_eq!(reach(&light, &Aabb::EMPTY, &receivers), Some(Reach::INFINITE), "unknown bounds");
+        assert_eq!(reach(&light, &TurnedBox::straight(Aabb::EMPTY), &receivers), Some(Reach::INFINITE), "unknown bounds");
         assert_eq!(reach(&light, &bounds, &Aabb::EMPTY), Some(Reach::INFINITE), "unknown receivers");
     }
 }

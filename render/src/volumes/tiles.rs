@@ -5,9 +5,10 @@
 //! triangles that cover a tile hide what is behind them. A volume that touches no such cell changes nothing that is seen:
 //! over all of its pixels it counts to 0, whichever way it is counted. No depth is read back, so that no frame waits.
 
+use super::TurnedBox;
 use super::hull::{self, extent};
-use glam::{BVec3, DMat4, DVec3, DVec4};
-use umbriel_scene::{Aabb, View};
+use glam::{DMat4, DVec3, DVec4};
+use umbriel_scene::View;
 
 /// Pixels of a tile's side, at least.
 const SMALLEST: u32 = 32;
@@ -45,11 +46,29 @@ struct Tile {
     normals: [DVec3; 4],
 }
 
+/// A box that shadows may fall on, from the eye.
+struct Receiver {
+    corners: [DVec3; 8],
+    /// Normals of its sides, and from where to where it goes along them.
+    slabs: [(DVec3, f64, f64); 3],
+}
+
+impl Receiver {
+    fn new(b: &TurnedBox, eye: DVec3) -> Receiver {
+        let corners = b.corners.map(|c| c.truncate() - eye);
+        let slab = |normal: DVec3| {
+            let heights = corners.map(|c| normal.dot(c));
+            (normal, heights.into_iter().fold(f64::INFINITY, f64::min), heights.into_iter().fold(f64::NEG_INFINITY, f64::max))
+        };
+        Receiver { corners, slabs: b.normals().map(slab) }
+    }
+}
+
 /// What is seen of a scene in a view, as far as shadows are concerned.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
     /// Boxes around all that shadows may fall on.
-    pub receivers: Vec<Aabb>,
+    pub receivers: Vec<TurnedBox>,
     /// Some of the triangles in the depth buffer, in the world.
     pub hiding: Vec<[glam::Vec3; 3]>,
 }
@@ -133,9 +152,10 @@ impl Tiles {
             }
         };
         for b in &seen.receivers {
-            let around = grid.around(&b.corners().map(|c| view_from_world.transform_point3(c.as_dvec3())));
+            let around = grid.around(&b.corners.map(|c| view_from_world.transform_point3(c.truncate())));
+            let receiver = Receiver::new(b, eye);
             each(around, &mut |tile, depths| {
-                if let Some((low, high)) = tile.span(eye, &view_from_world, b) {
+                if let Some((low, high)) = tile.span(&view_from_world, &receiver) {
                     *depths = (depths.0.min(low), depths.1.max(high));
                 }
             });
@@ -211,11 +231,9 @@ impl Tile {
 
     /// Nearest and farthest depth of what a box has in the pyramid: at its corners there, where the pyramid's edges pass it,
     /// and where its edges pass the pyramid's sides.
-    fn span(&self, eye: DVec3, view_from_world: &DMat4, b: &Aabb) -> Option<(f64, f64)> {
-        let (min, max) = (b.min.as_dvec3() - eye, b.max.as_dvec3() - eye);
+    fn span(&self, view_from_world: &DMat4, b: &Receiver) -> Option<(f64, f64)> {
         let depth = |p: DVec3| -view_from_world.transform_vector3(p).z;
-        let corners: [DVec3; 8] =
-            std::array::from_fn(|i| DVec3::select(BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), max, min));
+        let corners = &b.corners;
         let heights = corners.map(|c| self.normals.map(|n| n.dot(c)));
         if (0..4).any(|side| heights.iter().all(|h| h[side] < 0.0)) {
             return None;
@@ -228,16 +246,21 @@ impl Tile {
             }
         }
         for ray in self.rays {
-            let (a, b) = (min / ray, max / ray);
-            // 0 / 0 where the ray runs in a side of the box: no bound.
-            let from = a.min(b).to_array().into_iter().filter(|t| !t.is_nan()).fold(0.0, f64::max);
-            let to = a.max(b).to_array().into_iter().filter(|t| !t.is_nan()).fold(f64::INFINITY, f64::min);
+            let (mut from, mut to) = (0f64, f64::INFINITY);
+            for (normal, low, high) in &b.slabs {
+                let sinks = normal.dot(ray);
+                let (a, b) = (low / sinks, high / sinks);
+                // 0 / 0 where the ray runs in a side of the box: no bound.
+                if !a.is_nan() && !b.is_nan() {
+                    (from, to) = (from.max(a.min(b)), to.min(a.max(b)));
+                }
+            }
             if from <= to {
                 take(from);
                 take(to);
             }
         }
-        let slack = 1e-9 * (min.abs().max(max.abs())).max_element();
+        let slack = 1e-9 * corners.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max);
         for (i, bit) in (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, i | bit))).filter(|(i, j)| i != j) {
             for (a, b) in heights[i].into_iter().zip(heights[bit]) {
                 if (a < 0.0) != (b < 0.0) {

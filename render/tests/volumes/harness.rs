@@ -3,7 +3,7 @@
 use crate::shapes::Thing;
 use glam::{Mat4, Vec4};
 use umbriel_render::volumes::{
-    Depth, Seen, Sight, Surface, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats,
+    Depth, Seen, Sight, Surface, TurnedBox, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats,
 };
 use umbriel_scene::{Aabb, View, VolumeSettings};
 use wgpu::util::DeviceExt;
@@ -71,11 +71,11 @@ impl Loaded {
             positions: self.positions.clone(),
             positions_revision: self.revision,
             world_from_object: self.thing.world_from_object,
-            bounds_in_world: if self.thing.bounds_known {
+            bounds: if self.thing.bounds_known {
                 let bounds = Aabb::from_points(self.thing.mesh.positions.iter().copied());
-                bounds.transformed(&self.thing.world_from_object)
+                TurnedBox::of(&bounds, &self.thing.world_from_object)
             } else {
-                Aabb::EMPTY
+                TurnedBox::straight(Aabb::EMPTY)
             },
             surface: Surface::BothSides,
         }
@@ -177,7 +177,7 @@ impl Gpu {
         let target_view = target.create_view(&Default::default());
         let colour = self.texture(view, COLOUR).create_view(&Default::default());
         let mut encoder = self.device.create_command_encoder(&Default::default());
-        let all = casters.iter().chain(receivers).map(|l| l.caster().bounds_in_world);
+        let all = casters.iter().chain(receivers).map(|l| l.caster().bounds.in_world);
         let receives = if all.clone().any(|b| b.is_empty()) { Aabb::EMPTY } else { all.fold(Aabb::EMPTY, Aabb::union) };
         let job = VolumeJob { light, casters: casters.iter().map(Loaded::caster).collect(), receivers: receives };
         let mut sight = Sight::new(view, receives);
@@ -188,7 +188,7 @@ impl Gpu {
                 let corner = move |i: &u32| place.transform_point3(mesh.positions[*i as usize]);
                 mesh.indices.chunks_exact(3).map(move |t| [corner(&t[0]), corner(&t[1]), corner(&t[2])])
             });
-            let receivers = casters.iter().chain(receivers).map(|l| l.caster().bounds_in_world).collect();
+            let receivers = casters.iter().chain(receivers).map(|l| l.caster().bounds).collect();
             sight = sight.with(Seen { receivers, hiding: hiding.collect() });
         }
         let stats = self.pass.prepare(&self.device, &mut encoder, &[job]);
