@@ -44,6 +44,8 @@ pub struct Desk {
     made: HashMap<GuestId, HashMap<u32, u64>>,
     /// Nodes in whose lists a guest has put its own, by field.
     lists: HashMap<GuestId, BTreeSet<(u64, String)>>,
+    /// What a guest was last answered about a node, for whom the frame with the answer does not reach.
+    answers: BTreeMap<(GuestId, u64), Result<(), String>>,
     bulk: Bulk,
     changed: BTreeSet<u64>,
     word: Word,
@@ -82,6 +84,7 @@ impl Desk {
             joins: Vec::new(),
             made: HashMap::new(),
             lists: HashMap::new(),
+            answers: BTreeMap::new(),
             bulk: Bulk::new(),
             changed: BTreeSet::new(),
             word: Word::default(),
@@ -130,6 +133,7 @@ impl Desk {
         for node in gone {
             // A node that is gone has no owner; nothing else follows from it.
             self.ownership.step(0, OwnershipEvent::Deleted(node));
+            self.answers.retain(|(_, of), _| *of != node);
             self.changed.insert(node);
         }
         if self.ownership.members().next().is_none() && self.changed.is_empty() {
@@ -194,7 +198,9 @@ impl Desk {
         self.ownership.step(self.now_us(), OwnershipEvent::Joins { guest, name: join.name, keeps: join.keeps });
         let made = self.made.entry(guest).or_default().iter().map(|(key, number)| (guest.0, *key, *number)).collect();
         let whose = self.ownership.nodes().map(|node| self.whose(node)).collect();
-        let mut word = Word { made, whose, ..Word::default() };
+        let answers = self.answers.range((guest, 0)..=(guest, u64::MAX));
+        let answers = answers.map(|((_, node), answer)| (guest.0, *node, answer.clone())).collect();
+        let mut word = Word { made, whose, answers, ..Word::default() };
         self.head(&mut word, host.epoch(), host.last_frame());
         Ok(bytes_of(&(word, &snapshot[..])))
     }
@@ -211,7 +217,7 @@ impl Desk {
                         self.take(guest, message, graph);
                     }
                 }
-                OwnershipAction::Answer(guest, node, answer) => self.word.answers.push((guest.0, node, answer)),
+                OwnershipAction::Answer(guest, node, answer) => self.answer(guest, node, answer),
                 OwnershipAction::Changed(node) => drop(self.changed.insert(node)),
                 OwnershipAction::Remove(node) => {
                     self.changed.insert(node);
@@ -220,6 +226,7 @@ impl Desk {
                 OwnershipAction::Departed(guest, name) => {
                     tracing::info!("`{name}` has left the world");
                     self.made.remove(&guest);
+                    self.answers.retain(|(of, _), _| *of != guest);
                     self.tidy(guest, graph);
                 }
             }
@@ -255,10 +262,11 @@ impl Desk {
             match request {
                 GuestRequest::Lock(node) => match number(node) {
                     Some(node) => self.step(OwnershipEvent::Lock(guest, node), graph),
-                    None => self.word.answers.push((guest.0, node, Err("it is gone".into()))),
+                    None => self.answer(guest, node, Err("it is gone".into())),
                 },
                 GuestRequest::Unlock(node) => {
                     if let Some(node) = number(node) {
+                        self.answers.remove(&(guest, node));
                         self.step(OwnershipEvent::Unlock(guest, node), graph);
                     }
                 }
@@ -266,6 +274,11 @@ impl Desk {
                 GuestRequest::Leave => self.step(OwnershipEvent::Leaves(guest), graph),
             }
         }
+    }
+
+    fn answer(&mut self, guest: GuestId, node: u64, answer: Result<(), String>) {
+        self.answers.insert((guest, node), answer.clone());
+        self.word.answers.push((guest.0, node, answer));
     }
 
     /// The host's number of a node that a guest names.

@@ -1,6 +1,6 @@
 //! A guest's end: follows the host's world, and tells what is done to the copy here.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -96,7 +96,8 @@ pub struct Guest {
     host: Arc<str>,
     told: Outbox<Vec<u8>>,
     applied: u64,
-    locks_asked: BTreeSet<NodeId>,
+    /// Locks that no answer came for, and the numbers of the messages that asked for them.
+    locks_asked: BTreeMap<NodeId, u64>,
     asked: Option<Instant>,
     refused_since: Option<Instant>,
     is_leaving: bool,
@@ -139,7 +140,7 @@ impl Guest {
             host: "".into(),
             told: Outbox::default(),
             applied: 0,
-            locks_asked: BTreeSet::new(),
+            locks_asked: BTreeMap::new(),
             asked: None,
             refused_since: None,
             is_leaving: false,
@@ -411,8 +412,12 @@ impl Guest {
                     None => drop(whose.locks.remove(&node)),
                 }
             }
+            // An answer that comes with the world may be to an earlier question.
+            let done = word.guests.iter().find(|(id, ..)| *id == self.line.id).map_or(0, |(.., applied)| *applied);
             for (_, number, answer) in word.answers.iter().filter(|(guest, ..)| *guest == self.line.id) {
-                if let Some(node) = mirror.node(*number).filter(|node| self.locks_asked.remove(node)) {
+                let Some(node) = mirror.node(*number) else { continue };
+                if self.locks_asked.get(&node).is_some_and(|asked| *asked <= done) {
+                    self.locks_asked.remove(&node);
                     whose.answers.push((node, answer.clone()));
                 }
             }
@@ -431,7 +436,7 @@ impl Guest {
         for wish in wishes {
             requests.extend(match wish {
                 Wish::Lock(node) => {
-                    self.locks_asked.insert(*node);
+                    self.locks_asked.insert(*node, self.told.next());
                     mirror.number(*node).map(GuestRequest::Lock)
                 }
                 Wish::Unlock(node) => mirror.number(*node).map(GuestRequest::Unlock),
@@ -467,6 +472,62 @@ impl Guest {
             if self.next(Duration::from_millis(20)).is_err() {
                 break;
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cluster::LEASE;
+    use crate::cluster::message::stamped;
+    use umbriel_fields::replica::Publisher;
+    use umbriel_fields::{Field, NodeType};
+
+    fn world() -> Graph {
+        let mut graph = Graph::new(vec![NodeType::new("Box", "").field(Field::new("size", 1.0f32))]);
+        graph.create("Box").unwrap();
+        graph
+    }
+
+    /// The frames with the answers were lost on the way, and the world was fetched instead.
+    #[test]
+    fn answers_to_questions_come_with_the_world() {
+        let fresh = || Graph::new(vec![NodeType::new("Box", "").field(Field::new("size", 1.0f32))]);
+        let mut guest = Guest::connect("tcp/127.0.0.1:1", &Security::Loopback, LEASE, "guest", false, fresh).unwrap();
+        let (host, mut publisher) = (world(), Publisher::new());
+        let number = umbriel_fields::replica::number_of(host.nodes().next().unwrap());
+        let id = guest.line.id;
+        let mut fetched = |guest: &mut Guest, applied: u64, answers: Vec<(u64, u64, Result<(), String>)>| {
+            publisher.frame(&host);
+            let guests = vec![(id, "guest".into(), applied)];
+            let word = Word { epoch: 1, frame: publisher.last_frame(), host: "host".into(), guests, answers, ..Word::default() };
+            let bytes = bytes_of(&(word, stamped(1, publisher.snapshot(&host).unwrap())));
+            guest.fetch_again();
+            guest.handle(Arrived::World(Ok(bytes))).unwrap();
+            guest.progress()
+        };
+        assert_eq!(fetched(&mut guest, 0, vec![]), News::Begins);
+        let (mut graph, mut whose) = guest.enter();
+        let node = graph.nodes().next().unwrap();
+        // What was asked, up to where the host had come, what it had said, and what is heard of that.
+        let granted = (id, number, Ok(()));
+        let refused = (id, number, Err("`other` has locked it".to_string()));
+        let rows = [
+            (true, 0, vec![], vec![]),
+            (false, 1, vec![granted.clone()], vec![(node, Ok(()))]),
+            (false, 1, vec![granted.clone()], vec![]),
+            (true, 1, vec![granted.clone()], vec![]),
+            (false, 2, vec![(id + 1, number, Ok(()))], vec![]),
+            (false, 2, vec![refused.clone()], vec![(node, refused.2.clone())]),
+        ];
+        for (row, (asks, applied, answers, expected)) in rows.into_iter().enumerate() {
+            if asks {
+                guest.tell(&mut graph, &whose, &[Wish::Lock(node)]);
+            }
+            assert!(matches!(fetched(&mut guest, applied, answers), News::Frame(_)), "row {row}");
+            guest.follow(&mut graph, &mut whose);
+            assert_eq!(std::mem::take(&mut whose.answers), expected, "row {row}");
         }
     }
 }
