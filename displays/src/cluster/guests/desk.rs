@@ -64,7 +64,7 @@ impl Desk {
         };
         let mut subscribers = vec![session.declare_subscriber(DEEDS).callback(take).wait().map_err(network)?];
         let gone = sender.clone();
-        let alive = session.liveliness().declare_subscriber(format!("{GUEST}/*")).callback(move |sample| {
+        let alive = session.liveliness().declare_subscriber(format!("{GUEST}/*")).history(true).callback(move |sample| {
             let number = sample.key_expr().as_str().rsplit('/').next().and_then(|number| number.parse().ok());
             if let Some(number) = number {
                 let _ = gone.send(Arrived::Token(number, sample.kind() == SampleKind::Put));

@@ -35,7 +35,7 @@ pub enum OwnershipEvent {
     Unlock(GuestId, u64),
     /// A guest cannot be reached.
     Lost(GuestId),
-    /// A guest can be reached again.
+    /// A guest can be reached, for the first time or again.
     Found(GuestId),
     /// A guest goes.
     Leaves(GuestId),
@@ -75,6 +75,8 @@ struct Member {
 pub struct Ownership {
     /// How long a guest that cannot be reached keeps its nodes and locks, microseconds.
     grace_us: u64,
+    /// Who can be reached, member or not yet.
+    reachable: BTreeSet<GuestId>,
     members: BTreeMap<GuestId, Member>,
     owners: BTreeMap<u64, GuestId>,
     locks: BTreeMap<u64, GuestId>,
@@ -83,7 +85,13 @@ pub struct Ownership {
 impl Ownership {
     /// Nobody is there. A guest that cannot be reached for `grace_us` is gone.
     pub fn new(grace_us: u64) -> Ownership {
-        Ownership { grace_us, members: BTreeMap::new(), owners: BTreeMap::new(), locks: BTreeMap::new() }
+        Ownership {
+            grace_us,
+            reachable: BTreeSet::new(),
+            members: BTreeMap::new(),
+            owners: BTreeMap::new(),
+            locks: BTreeMap::new(),
+        }
     }
 
     /// Who is there, by name, with the last message that was taken of each.
@@ -150,7 +158,9 @@ impl Ownership {
         match event {
             OwnershipEvent::Joins { guest, name, keeps } => {
                 let fresh = Member { name, keeps, taken: 0, early: BTreeSet::new(), lost_us: None };
-                self.members.entry(guest).or_insert(fresh).lost_us = None;
+                // Who died while its question was on its way is not there for ever.
+                let lost_us = (!self.reachable.contains(&guest)).then_some(now_us);
+                self.members.entry(guest).or_insert(fresh).lost_us = lost_us;
             }
             OwnershipEvent::Arrived(guest, number) => self.arrived(now_us, guest, number, &mut actions),
             OwnershipEvent::Made(guest, node) => {
@@ -178,11 +188,13 @@ impl Ownership {
                 }
             }
             OwnershipEvent::Lost(guest) => {
+                self.reachable.remove(&guest);
                 if let Some(member) = self.members.get_mut(&guest) {
                     member.lost_us.get_or_insert(now_us);
                 }
             }
             OwnershipEvent::Found(guest) => {
+                self.reachable.insert(guest);
                 if let Some(member) = self.members.get_mut(&guest) {
                     member.lost_us = None;
                 }

@@ -157,8 +157,15 @@ impl Simulation {
         if self.guests.values().filter(|guest| guest.is_alive).count() < 4 && self.random.one_in(20) {
             self.next_guest += 1;
             let (guest, keeps) = (GuestId(self.next_guest), self.random.one_in(2));
-            let fresh = Model { keeps, sent: 0, unconfirmed: BTreeMap::new(), is_alive: true, asked: 0, answered: 0 };
+            // Some die while they ask to be let in.
+            let is_alive = !self.random.one_in(8);
+            let fresh = Model { keeps, sent: 0, unconfirmed: BTreeMap::new(), is_alive, asked: 0, answered: 0 };
             self.guests.insert(guest, fresh);
+            self.event(OwnershipEvent::Found(guest));
+            if !is_alive {
+                self.tokens_lost.insert(guest, self.now_us);
+                self.event(OwnershipEvent::Lost(guest));
+            }
             self.event(OwnershipEvent::Joins { guest, name: format!("guest {}", guest.0), keeps });
         }
         let alive: Vec<GuestId> = self.guests.iter().filter(|(_, model)| model.is_alive).map(|(guest, _)| *guest).collect();
