@@ -11,9 +11,9 @@ use glam::{DMat4, DVec3, DVec4};
 use umbriel_scene::View;
 
 /// Pixels of a tile's side, at least.
-const SMALLEST: u32 = 32;
+const SMALLEST: u32 = 8;
 /// Tiles across and down, at most.
-const MOST: u32 = 16;
+const MOST: u32 = 32;
 
 /// The depth bounds of a view.
 pub(super) struct Tiles {
