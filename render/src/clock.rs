@@ -51,8 +51,7 @@ impl Clock {
             }
         };
         // Software waits for all of a pass to read its clock, which takes a part of the frame.
-        let is_timed =
-            device.features().contains(wgpu::Features::TIMESTAMP_QUERY) && gpu.info.device_type != wgpu::DeviceType::Cpu;
+        let is_timed = device.features().contains(wgpu::Features::TIMESTAMP_QUERY) && !gpu.is_software();
         let gpu = is_timed.then(make);
         Clock { gpu, labels: RefCell::default(), latest: Vec::new() }
     }

@@ -77,6 +77,11 @@ impl Gpu {
         Ok(Gpu { instance, adapter, device, queue, info, reports })
     }
 
+    /// Does the processor draw?
+    pub(crate) fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
     /// Features without which nothing is drawn.
     pub fn required_features() -> wgpu::Features {
         wgpu::Features::DEPTH32FLOAT_STENCIL8

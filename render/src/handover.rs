@@ -17,9 +17,8 @@ const MARKS: u32 = 256;
 
 impl Handover {
     pub(crate) fn new(gpu: &Gpu) -> Handover {
-        let is_software = gpu.info.device_type == wgpu::DeviceType::Cpu;
         let has_marks = gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
-        let marks = (is_software && has_marks).then(|| {
+        let marks = (gpu.is_software() && has_marks).then(|| {
             gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("handover"),
                 ty: wgpu::QueryType::Timestamp,

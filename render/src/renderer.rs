@@ -162,7 +162,7 @@ impl Renderer {
             purposes: &jobs.purposes,
             soft: &soft,
             contours: &contours,
-            bounds_depth: self.gpu.info.device_type == wgpu::DeviceType::Cpu,
+            bounds_depth: self.gpu.is_software(),
         };
         let (plans, sheets) = self.plan_views(pictures, &frame, &mut stats);
         self.maps.prepare(&self.gpu.device, &mut self.views, &mut self.draws);

@@ -80,6 +80,13 @@ pub(super) struct Word {
     pub(super) answers: Vec<(u64, u64, Result<(), String>)>,
 }
 
+impl Word {
+    /// The last message of a guest that was done; none for who is not there.
+    pub(super) fn done_of(&self, guest: u64) -> Option<u64> {
+        self.guests.iter().find(|(id, ..)| *id == guest).map(|(.., done)| *done)
+    }
+}
+
 /// The application lets a frame be shown.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Release {

@@ -202,7 +202,7 @@ impl Guest {
             },
             Arrived::Word(bytes) => match message_of::<Word>(&bytes) {
                 Ok(word) if word.epoch == self.epoch => {
-                    if self.replica.is_some() && !word.guests.iter().any(|(id, ..)| *id == self.line.id) {
+                    if self.replica.is_some() && word.done_of(self.line.id).is_none() {
                         // It was given up: its nodes are gone, or the host's.
                         if !self.is_leaving {
                             tracing::warn!("this application was away for too long; it joins anew");
@@ -339,7 +339,7 @@ impl Guest {
             return None;
         }
         let (word, epoch, packet) = self.world.take()?;
-        let applied = word.guests.iter().find(|(id, ..)| *id == self.line.id).map_or(0, |(.., applied)| *applied);
+        let applied = word.done_of(self.line.id).unwrap_or(0);
         let is_first = self.epoch != epoch || self.mirror.is_none() || applied < self.applied;
         if is_first {
             self.graph = (self.fresh)();
@@ -380,9 +380,7 @@ impl Guest {
             for (_, key, number) in word.made.iter().filter(|(guest, ..)| *guest == self.line.id) {
                 mirror.made(*key, *number);
             }
-            if let Some((.., applied)) = word.guests.iter().find(|(id, ..)| *id == self.line.id) {
-                self.applied = self.applied.max(*applied);
-            }
+            self.applied = self.applied.max(word.done_of(self.line.id).unwrap_or(0));
             for (_, why) in word.refused.iter().filter(|(guest, _)| *guest == self.line.id) {
                 tracing::error!("not done: {why}");
             }
@@ -413,7 +411,7 @@ impl Guest {
                 }
             }
             // An answer that comes with the world may be to an earlier question.
-            let done = word.guests.iter().find(|(id, ..)| *id == self.line.id).map_or(0, |(.., applied)| *applied);
+            let done = word.done_of(self.line.id).unwrap_or(0);
             for (_, number, answer) in word.answers.iter().filter(|(guest, ..)| *guest == self.line.id) {
                 let Some(node) = mirror.node(*number) else { continue };
                 if self.locks_asked.get(&node).is_some_and(|asked| *asked <= done) {
