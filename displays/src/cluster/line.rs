@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crossbeam::channel::{Receiver, Sender, unbounded};
+use crossbeam::channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
 use super::cache::Cache;
-use super::frames::Frames;
+use super::frames::{Frames, Memory};
 use super::lines::number_of_process;
 use super::message::{APPLICATION, BULK};
 use super::near::{Bell, Word};
@@ -21,6 +21,9 @@ use super::transport::{ClusterError, End, Security, network, open, port_of};
 
 /// How long an answer may take.
 const ANSWER: Duration = Duration::from_secs(5);
+
+/// How often who listens meanwhile looks whether that is over, where nothing wakes it.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// An answer, or why there is none.
 pub(super) type Answer = Result<Vec<u8>, String>;
@@ -71,6 +74,27 @@ impl<A, F: Fn(Answer) -> A> Drop for Asked<A, F> {
         if !self.is_answered.load(Ordering::Relaxed) {
             self.post.send((self.arrived)(Err("nobody answers".into())));
         }
+    }
+}
+
+/// Who listens to the short line.
+struct Ear<'a, A> {
+    short: &'a mut Short,
+    /// What is said there to lie in it.
+    memory: Option<&'a Memory>,
+    post: &'a Post<A>,
+    kind: fn(Vec<u8>) -> A,
+}
+
+impl<A> Ear<'_, A> {
+    /// Takes what comes within some time; false at once where there is no short line.
+    fn hear(&mut self, patience: Duration) -> bool {
+        let Ear { short, memory, post, kind } = self;
+        short.wait(&post.bell, patience, |word, message| match (word, *memory) {
+            (Word::Here, Some(memory)) => memory.read(message),
+            (Word::Release, _) => post.send(kind(message.to_vec())),
+            _ => {}
+        })
     }
 }
 
@@ -164,13 +188,27 @@ impl<A: Send + 'static> Line<A> {
         if arrived.is_some() || patience.is_zero() {
             return arrived;
         }
-        let Line { frames, short, post, subject: (_, kind), .. } = self;
-        let waited = short.wait(&post.bell, patience, |word, message| match (word, frames.memory()) {
-            (Word::Here, Some((memory, _))) => memory.read(message),
-            (Word::Release, _) => post.send(kind(message.to_vec())),
-            _ => {}
-        });
+        let waited = self.ear().hear(patience);
         if waited { self.arrived.try_recv().ok() } else { self.arrived.recv_timeout(patience).ok() }
+    }
+
+    fn ear(&mut self) -> Ear<'_, A> {
+        let memory = self.frames.memory().map(|(memory, _)| memory);
+        Ear { short: &mut self.short, memory, post: &self.post, kind: self.subject.1 }
+    }
+
+    /// Does what may take long, and takes meanwhile what comes down the short line: neither that nor the application's memory holds much.
+    pub(super) fn meanwhile<R>(&mut self, work: impl FnOnce() -> R) -> R {
+        let mut ear = self.ear();
+        let post = ear.post;
+        let (at_work, is_done) = bounded::<()>(0);
+        std::thread::scope(|scope| {
+            scope.spawn(move || while is_done.try_recv() == Err(TryRecvError::Empty) && ear.hear(LOOK) {});
+            let done = work();
+            drop(at_work);
+            post.bell.ring();
+            done
+        })
     }
 
     /// What the application said last down the short line of the subject; that it went may be known sooner.

@@ -8,7 +8,7 @@ use super::{DisplayId, TimeUs};
 const FIRST_REST_US: TimeUs = 100_000;
 /// The longest where it stood still or was cut off.
 const LONGEST_REST_US: TimeUs = 400_000;
-/// The longest where it draws too slowly for the others. What it draws in time it shows all the same.
+/// The longest where it draws too slowly for the others. What it draws it shows all the same, in time or late.
 const LONGEST_REST_OF_SLOW_US: TimeUs = 12_800_000;
 /// Frames in a row, and times the rest, after which earlier failures are forgotten.
 const GOOD_FRAMES: u32 = 60;
@@ -49,7 +49,8 @@ pub enum ApplicationAction {
     Admitted(DisplayId),
     /// Nobody waits for this display any more; it was late for this frame.
     Dropped(DisplayId, u64),
-    /// A display is late again and again, because it draws too slowly. Told once, until it was in time for long.
+    /// A display is late again and again, because it draws too slowly, whether it was ever waited for or not. Told once, until it was in
+    /// time for long.
     TooSlow {
         /// The display.
         display: DisplayId,
@@ -82,15 +83,22 @@ struct Member {
     failing_since_us: TimeUs,
     /// It was left behind, and has not drawn anything since.
     is_late: bool,
+    /// What it drew last was shown by the others before, because it draws too slowly.
+    is_behind: bool,
     /// The longest that it drew something that it was late with, where that is too long.
     too_long_us: TimeUs,
     is_told: bool,
 }
 
+/// Who draws faster than this is in time where there is so much time.
+fn well_within(time_us: TimeUs) -> TimeUs {
+    2 * time_us / 3
+}
+
 impl Member {
     /// Draws well within a time.
     fn is_fast(&self, within_us: TimeUs) -> bool {
-        3 * self.took_us < 2 * within_us
+        self.took_us < well_within(within_us)
     }
 
     fn may_come_in(&self, now_us: TimeUs) -> bool {
@@ -101,11 +109,15 @@ impl Member {
         (self.is_live, self.live_since_us) = (true, now_us);
     }
 
-    fn fails(&mut self, now_us: TimeUs) {
+    fn is_late_once_more(&mut self, now_us: TimeUs) {
         if self.failures == 0 {
             self.failing_since_us = now_us;
         }
         self.failures += 1;
+    }
+
+    fn fails(&mut self, now_us: TimeUs) {
+        self.is_late_once_more(now_us);
         (self.is_live, self.is_late, self.good_frames) = (false, true, 0);
         self.rest_us = self.rest_us.min(self.longest_rest_us());
         self.rests_until_us = now_us + self.rest_us;
@@ -133,13 +145,14 @@ pub struct ApplicationLock {
     frame: u64,
     released: u64,
     published_us: TimeUs,
+    released_us: TimeUs,
     members: BTreeMap<DisplayId, Member>,
 }
 
 impl ApplicationLock {
     /// Nobody there, nothing published.
     pub fn new(timeout_us: TimeUs) -> Self {
-        Self { timeout_us, frame: 0, released: 0, published_us: 0, members: BTreeMap::new() }
+        Self { timeout_us, frame: 0, released: 0, published_us: 0, released_us: 0, members: BTreeMap::new() }
     }
 
     /// True while a frame waits for displays.
@@ -150,6 +163,11 @@ impl ApplicationLock {
     /// How long a frame waits.
     pub fn timeout_us(&self) -> TimeUs {
         self.timeout_us
+    }
+
+    /// Who draws faster than this is waited for.
+    pub fn fast_us(&self) -> TimeUs {
+        well_within(self.timeout_us)
     }
 
     /// The last frame that was published.
@@ -172,13 +190,12 @@ impl ApplicationLock {
         let mut actions = Vec::new();
         match event {
             ApplicationEvent::Published(frame) => {
-                let before_us = std::mem::replace(&mut self.published_us, now_us);
-                self.frame = frame;
+                (self.frame, self.published_us) = (frame, now_us);
                 for (id, member) in &mut self.members {
-                    // It became ready since the last frame, so that it idles now: what is released already it does not draw.
+                    // It idles now: it has drawn the last one, or became ready since that was released, and passes it over.
                     let had_last = member.ready + 1 == frame && member.took_us < self.timeout_us;
-                    let is_in_step = had_last || member.is_fast(self.timeout_us);
-                    if member.may_come_in(now_us) && member.ready_us >= before_us && is_in_step {
+                    let has_passed = member.ready_us >= self.released_us && member.is_fast(self.timeout_us);
+                    if member.may_come_in(now_us) && (had_last || has_passed) {
                         member.comes_in(now_us);
                         actions.push(ApplicationAction::Admitted(*id));
                     }
@@ -196,7 +213,7 @@ impl ApplicationLock {
     }
 
     fn ready(&mut self, now_us: TimeUs, id: DisplayId, frame: u64, took_us: TimeUs, actions: &mut Vec<ApplicationAction>) {
-        let (is_waiting, current) = (self.waits(), self.frame);
+        let (is_waiting, current, released) = (self.waits(), self.frame, self.released);
         let member = self.members.entry(id).or_insert(Member {
             is_live: false,
             ready: 0,
@@ -210,6 +227,7 @@ impl ApplicationLock {
             failures: 0,
             failing_since_us: now_us,
             is_late: false,
+            is_behind: false,
             too_long_us: 0,
             is_told: false,
         });
@@ -219,15 +237,20 @@ impl ApplicationLock {
             return;
         }
         (member.ready, member.ready_us, member.took_us) = (frame, now_us, took_us);
-        if std::mem::take(&mut member.is_late) {
-            if !member.is_fast(self.timeout_us) {
-                member.too_long_us = member.too_long_us.max(took_us);
-            }
-            if member.too_long_us > 0 && member.failures >= TELLING && !std::mem::replace(&mut member.is_told, true) {
-                let (times, within_us) = (member.failures, now_us - member.failing_since_us);
-                let took_us = member.too_long_us;
-                actions.push(ApplicationAction::TooSlow { display: id, times, within_us, took_us });
-            }
+        let (was_dropped, is_slow) = (std::mem::take(&mut member.is_late), !member.is_fast(self.timeout_us));
+        let is_behind = is_slow && !member.is_live && frame <= released;
+        // What is drawn first after a snapshot may take long: who is behind twice in a row is too slow.
+        let is_behind_again = std::mem::replace(&mut member.is_behind, is_behind) && is_behind;
+        if is_behind_again && !was_dropped {
+            member.is_late_once_more(now_us);
+        }
+        if is_slow && (is_behind_again || was_dropped) {
+            member.too_long_us = member.too_long_us.max(took_us);
+        }
+        if member.too_long_us > 0 && member.failures >= TELLING && !std::mem::replace(&mut member.is_told, true) {
+            let (times, within_us) = (member.failures, now_us - member.failing_since_us);
+            let took_us = member.too_long_us;
+            actions.push(ApplicationAction::TooSlow { display: id, times, within_us, took_us });
         }
         // The others take their time for the last frame, and it turns to that too. If it will be in time, it is waited for.
         let spent_us = now_us - self.published_us;
@@ -255,7 +278,7 @@ impl ApplicationLock {
                 member.succeeds(now_us);
             }
         }
-        self.released = frame;
+        (self.released, self.released_us) = (frame, now_us);
         // Who was not waited for but is in time may show the frame with the others.
         let in_time = self.members.iter().filter(|(_, member)| member.ready == frame).map(|(id, _)| *id).collect();
         actions.push(ApplicationAction::Release(frame, in_time));

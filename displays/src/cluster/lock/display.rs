@@ -10,6 +10,8 @@ const FETCH_US: TimeUs = 200_000;
 const PATIENCE_US: TimeUs = 20_000;
 /// Ready is said again after so long without an answer: it may have been lost.
 const REPEAT_US: TimeUs = 40_000;
+/// What the others have shown already is drawn where nothing newer comes for so long.
+const IDLE_US: TimeUs = 100_000;
 /// More frames than this are not kept to catch up with: a snapshot is less work.
 const BACKLOG: usize = 256;
 /// Who answers for so long, while nothing comes of the run that is followed, is the application: the word of a later run was none.
@@ -90,12 +92,17 @@ pub struct DisplayLock {
     released: u64,
     /// The last frame that came, or that a snapshot was as of.
     newest: u64,
+    /// Something was drawn just now, and what came meanwhile is not looked at yet.
+    has_drawn: bool,
+    /// The last frame that came while another one was drawn, and that the others have shown; and when it was passed over.
+    passed: u64,
+    passed_us: TimeUs,
     /// Nothing was drawn since the last snapshot: pipelines, meshes and textures are not on the GPU yet.
     is_cold: bool,
     /// When a snapshot was last asked for, while one is needed.
     fetching_since_us: Option<TimeUs>,
     missing_since_us: Option<TimeUs>,
-    /// Since when a frame could be drawn, but for the last one, which is not known to be released.
+    /// Since when a frame could be drawn, but for the release of the last one, which is not heard of.
     held_since_us: Option<TimeUs>,
     said_ready_us: TimeUs,
     /// Since when an earlier run answers, while nothing comes of this one.
@@ -147,17 +154,16 @@ impl DisplayLock {
                     (self.applied, self.fetching_since_us) = (Some(frame), None);
                     self.is_cold = true;
                     actions.push(DisplayAction::Restore(frame));
-                    self.waiting = self.waiting.split_off(&(frame + 1));
-                    self.waiting.split_off(&(frame + BACKLOG as u64));
+                    self.waiting = self.waiting.split_off(&frame.saturating_add(1));
+                    self.waiting.split_off(&frame.saturating_add(BACKLOG as u64));
                     self.newest = self.waiting.last().copied().unwrap_or(frame);
                 }
                 self.advance(now_us, &mut actions);
             }
             DisplayEvent::Release { epoch, frame, is_mine } if self.is_current(epoch, &mut actions) => {
                 self.released = self.released.max(frame);
-                if is_mine && self.drawn == frame && self.shown < frame {
-                    self.shown = frame;
-                    actions.push(DisplayAction::Show(frame));
+                if is_mine && self.drawn == frame {
+                    self.show(&mut actions);
                 }
                 self.advance(now_us, &mut actions);
             }
@@ -181,7 +187,7 @@ impl DisplayLock {
                 // What was drawn for another run of the application is worth nothing.
                 if self.drawing == Some(frame) {
                     self.drawing = None;
-                    self.is_cold = false;
+                    (self.is_cold, self.has_drawn) = (false, true);
                     self.drawn = frame;
                     self.say_ready(now_us, &mut actions);
                 }
@@ -250,8 +256,12 @@ impl DisplayLock {
             return;
         }
         let Some(applied) = self.applied else { return self.fetch(now_us, actions) };
+        // A later frame is there only once this one was released, to whomever: who was late for it shows it late.
+        if applied > self.drawn {
+            self.show(actions);
+        }
         match self.waiting.first().copied() {
-            Some(frame) if frame == applied + 1 => {
+            Some(frame) if frame == applied.saturating_add(1) => {
                 self.waiting.remove(&frame);
                 self.missing_since_us = None;
                 self.is_applying = true;
@@ -269,17 +279,28 @@ impl DisplayLock {
         }
     }
 
+    fn show(&mut self, actions: &mut Vec<DisplayAction>) {
+        if self.shown < self.drawn {
+            self.shown = self.drawn;
+            actions.push(DisplayAction::Show(self.drawn));
+        }
+    }
+
     /// Draws the newest frame, unless the others are done with it.
     fn draw(&mut self, now_us: TimeUs, actions: &mut Vec<DisplayAction>) {
         let Some(applied) = self.applied.filter(|_| !self.is_applying && self.drawing.is_none()) else { return };
-        let has_next = self.waiting.first() == Some(&(applied + 1));
-        // Where nobody is waited for, a frame comes together with its release: who never drew it would never be in step.
-        let is_wanted = applied > self.drawn && (self.is_cold || applied >= self.released);
+        let has_next = self.waiting.first() == Some(&applied.saturating_add(1));
+        // Who idles when the next frame is published can be waited for. Where nobody is, that comes together with its release.
+        if std::mem::take(&mut self.has_drawn) && applied <= self.released {
+            (self.passed, self.passed_us) = (applied, now_us);
+        }
+        let is_next = applied > self.passed || now_us >= self.passed_us + IDLE_US;
+        let is_wanted = applied > self.drawn && (self.is_cold || is_next && applied >= self.released);
         if has_next || !is_wanted {
             return;
         }
-        // The release of what waits to be shown may have been overtaken by the next frame.
-        if self.drawn > self.shown.max(self.released) {
+        // The release of what was drawn last may have been overtaken by this frame, and so may that of this one.
+        if self.drawn > self.released {
             let since = *self.held_since_us.get_or_insert(now_us);
             if now_us < since + PATIENCE_US {
                 return;
@@ -294,6 +315,25 @@ impl DisplayLock {
         if self.fetching_since_us.is_none_or(|since| now_us >= since + FETCH_US) {
             self.fetching_since_us = Some(now_us);
             actions.push(DisplayAction::Fetch);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Forged, but numbers all the same.
+    #[test]
+    fn the_last_numbers_are_numbers_as_others() {
+        for last in [u64::MAX, u64::MAX - 1, u64::MAX - BACKLOG as u64] {
+            let mut lock = DisplayLock::new();
+            lock.step(0, DisplayEvent::Frame { epoch: 1, frame: u64::MAX });
+            let restored = lock.step(0, DisplayEvent::Snapshot { epoch: 1, frame: last });
+            assert_eq!(restored.first(), Some(&DisplayAction::Restore(last)));
+            lock.step(0, DisplayEvent::Frame { epoch: 1, frame: u64::MAX });
+            lock.step(0, DisplayEvent::Release { epoch: 1, frame: u64::MAX, is_mine: true });
+            assert!(lock.step(0, DisplayEvent::Tick).len() < 2);
         }
     }
 }

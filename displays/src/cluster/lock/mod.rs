@@ -6,9 +6,10 @@
 //!
 //! The application publishes frame n and waits until every live display is ready with it; then it releases n and names those who may
 //! show it. A display stops being live when it keeps the others waiting for longer than the timeout. It becomes live once it is in step:
-//! its first drawing after a snapshot, which may take seconds, is not waited for; then it skips what is released already, and draws the next
-//! frame that comes. It is waited for once it idles when a frame is published and either had the one before or draws well within the timeout. Frames are numbered without gaps within an epoch, which is one run of the application; a
-//! display that misses a frame fetches a snapshot.
+//! its first drawing after a snapshot, which may take seconds, is not waited for; then it passes over what was released meanwhile, and draws
+//! the next frame that comes. It is waited for once it idles when a frame is published and either had the one before or draws well within
+//! the timeout. Who was late with a frame shows it late, as soon as a later one is there: that is never published before the release.
+//! Frames are numbered without gaps within an epoch, which is one run of the application; a display that misses a frame fetches a snapshot.
 
 mod application;
 mod display;

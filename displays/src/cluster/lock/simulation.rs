@@ -1,5 +1,5 @@
 //! A seeded simulation of one application and several displays: messages are late, lost, repeated and out of order, displays and the
-//! application freeze, crash and come back, replicas are corrupted, releases are forged. What must hold holds at every step.
+//! application freeze, crash and come back, replicas are corrupted, releases and frames are forged. What must hold holds at every step.
 //!
 //! `UMBRIEL_LOCK_SEEDS=2000 cargo test --release -p umbriel-displays lock` runs more of it.
 
@@ -65,6 +65,7 @@ struct Display {
     /// Nothing was drawn since the last snapshot.
     is_cold: bool,
     took_us: TimeUs,
+    shown: u64,
     /// Drawing or frozen until then; messages wait.
     busy_until_us: TimeUs,
     inbox: VecDeque<Message>,
@@ -82,6 +83,7 @@ impl Display {
             drawn: (0, 0),
             is_cold: true,
             took_us: 0,
+            shown: 0,
             busy_until_us: 0,
             inbox: VecDeque::new(),
             is_cut_off: false,
@@ -387,6 +389,7 @@ impl Simulation {
                 DisplayAction::Show(frame) => {
                     assert!(display.drawn >= (epoch, frame));
                     self.tally.shown += 1;
+                    display.shown += 1;
                     self.shows(place, epoch, frame);
                 }
                 DisplayAction::Forget => display.packets.clear(),
@@ -436,6 +439,13 @@ impl Simulation {
                 self.tally.forged += 1;
                 let id = self.displays[place].id;
                 self.at(100, Some(place), id, Message::Release { epoch, frame, may_show: Vec::new() });
+            }
+            58..59 => {
+                // A frame that never was, as far from all others as can be.
+                let (epoch, frame, world) = (self.epoch, u64::MAX - self.dice.below(300), self.dice.next());
+                self.tally.forged += 1;
+                let id = self.displays[place].id;
+                self.at(100, Some(place), id, Message::Frame { epoch, frame, world });
             }
             _ => {}
         }
@@ -549,5 +559,41 @@ fn a_display_that_is_too_slow_holds_the_others_up_less_and_less() {
         simulation.slow = Some((1, too_slow));
         simulation.run_until(170_000_000);
         assert_eq!(simulation.tally.told_slow, 2, "seed {seed}");
+    }
+}
+
+/// A display that is never fast enough shows what it draws, late, from the first frame on; the operator hears of it, nobody waits for it,
+/// and the world is fetched once. Once it is fast enough it is in the lock.
+#[test]
+fn a_display_that_is_always_too_slow_shows_late_what_it_draws() {
+    let faults = Faults { lost: 0, repeated: 0, longest_us: 300, disasters: false, together: true };
+    let pace = Pace { first_us: 100_000, each_us: 4_000 };
+    let too_slow = Pace { first_us: 4_000_000, each_us: 2 * TIMEOUT_US };
+    for (seed, displays) in (0..20).flat_map(|seed| [(seed, 1), (seed, 3)]) {
+        let mut simulation = Simulation::new(seed, displays, faults, pace);
+        simulation.slow = Some((0, too_slow));
+        simulation.run_until(30_000_000);
+        let (shown, tally) = (simulation.displays[0].shown, &simulation.tally);
+        assert!(shown >= 30, "seed {seed}: {shown} shown");
+        assert_eq!((tally.told_slow, tally.fetches, tally.drops), (1, displays as u64, 0), "seed {seed}");
+        assert!(tally.longest_stall_us < 60_000, "seed {seed}: a stall of {} us", tally.longest_stall_us);
+        simulation.slow = None;
+        simulation.run_until(32_000_000);
+        assert!(simulation.all_show(), "seed {seed}: {:?}", simulation.application);
+        assert_eq!(simulation.tally.fetches, displays as u64, "seed {seed}");
+    }
+}
+
+/// Where a frame takes several of the application's, the one that is drawn when the next is published is not waited for as well.
+#[test]
+fn who_draws_well_within_the_timeout_is_waited_for() {
+    let faults = Faults { lost: 0, repeated: 0, longest_us: 300, disasters: false, together: true };
+    let pace = Pace { first_us: 1_000_000, each_us: 85_000 };
+    for seed in 0..20 {
+        let mut simulation = Simulation::new(seed, 1, faults, pace);
+        simulation.run_until(3_000_000);
+        assert!(simulation.all_show(), "seed {seed}: {:?}", simulation.application);
+        simulation.run_until(30_000_000);
+        assert_eq!((simulation.tally.drops, simulation.tally.told_slow), (0, 0), "seed {seed}");
     }
 }
