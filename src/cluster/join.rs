@@ -82,6 +82,7 @@ fn whose(world: &World) -> Whose {
         owners: std::mem::take(&mut sharing.owners),
         locks: std::mem::take(&mut sharing.locks),
         answers: Vec::new(),
+        refused: Vec::new(),
     })
 }
 
@@ -96,6 +97,7 @@ fn follow(guest: &mut Guest, world: &mut World) {
     let mut whose = whose(world);
     guest.follow(world.graph_mut(), &mut whose);
     let answers = std::mem::take(&mut whose.answers);
+    whose.refused.drain(..).for_each(|why| tracing::error!("not done: {why}"));
     put_back(world, whose);
     for (node, answer) in answers {
         world.answer(node, &answer);

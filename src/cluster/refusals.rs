@@ -9,7 +9,7 @@ use tracing::field::{Field, Visit};
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::Layer;
 use tracing_subscriber::layer::Context;
-use umbriel_displays::cluster::{Quiet, number_of_process};
+use umbriel_displays::cluster::{Quiet, Words, number_of_process};
 
 /// What zenoh appends to whatever goes wrong while a connection is accepted.
 const HINT: &str = ". Hint: increase the system open file limit.";
@@ -61,10 +61,8 @@ impl Refusals {
     fn tell(&self, words: impl IntoIterator<Item = String>) {
         for text in words {
             // Not while the lock is held: what is logged comes by here.
-            let is_news = self.enter().quiet.is_news(&text);
-            if is_news {
-                tracing::warn!("{text}");
-            }
+            let news = self.enter().quiet.news(Words::Warn(text));
+            news.into_iter().for_each(Words::say);
         }
     }
 }

@@ -1,9 +1,9 @@
 //! A display's end: follows the application's frames, has them drawn, and shown on release.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use umbriel_fields::replica::{Bulk, Packet, Replica, ReplicaError};
+use umbriel_fields::replica::{Replica, ReplicaError};
 use umbriel_fields::{Graph, TypeRegistry};
 use zenoh::Wait;
 use zenoh::pubsub::Publisher as ZenohPublisher;
@@ -17,8 +17,8 @@ use super::message::{
     DISPLAY, INPUT, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, Told, bytes_of, message_of, stamped_packet,
 };
 use super::ordered::Outbox;
-use super::quiet::Quiet;
 use super::transport::{ClusterError, End, Security, network};
+use super::world::World;
 
 /// Draws and shows what a follower follows.
 pub trait Screen {
@@ -100,22 +100,14 @@ enum Parked {
 /// A display process in the lock.
 pub struct Follower {
     line: Line<Arrived>,
-    endpoint: String,
     name: String,
-    types: TypeRegistry,
     ready: ZenohPublisher<'static>,
     input: ZenohPublisher<'static>,
     /// What was told to a run of the application.
     told: (u64, Outbox<Vec<u8>>),
     lock: DisplayLock,
-    replica: Option<Replica>,
-    /// One that differs from the application, until it is known where.
-    doubted: Option<Replica>,
-    is_new: bool,
-    bulk: Bulk,
+    world: World,
     parked: VecDeque<Parked>,
-    packets: BTreeMap<u64, Packet<'static>>,
-    snapshot: Option<Packet<'static>>,
     started: Instant,
     last_shown: Option<Instant>,
     refused_since: Option<Instant>,
@@ -124,7 +116,6 @@ pub struct Follower {
     alone_since: Option<Instant>,
     /// There is an application, and it owes no answer.
     can_ask: bool,
-    quiet: Quiet,
     is_over: bool,
     /// For the last drawing.
     took: Duration,
@@ -142,6 +133,9 @@ const APPLICATION_ENDED_AFTER: Duration = Duration::from_secs(5);
 
 /// What the application did not confirm within this time is told again.
 const TOLD_AGAIN_AFTER: Duration = Duration::from_millis(200);
+
+/// Who drew for so long may miss frames while it draws the next one.
+const LONG: Duration = Duration::from_millis(30);
 
 fn put(publisher: &ZenohPublisher<'static>, bytes: &[u8]) {
     if let Err(error) = publisher.put(bytes).wait() {
@@ -166,27 +160,19 @@ impl Follower {
         line.announce(DISPLAY)?;
         Ok(Follower {
             line,
-            endpoint,
             name: name.into(),
-            types: types.into(),
             ready,
             input,
             told: (0, Outbox::default()),
             lock: DisplayLock::new(),
-            replica: None,
-            doubted: None,
-            is_new: true,
-            bulk: Bulk::new(),
+            world: World::of(endpoint, types.into()),
             parked: VecDeque::new(),
-            packets: BTreeMap::new(),
-            snapshot: None,
             started: Instant::now(),
             last_shown: None,
             refused_since: None,
             ends_with_application,
             alone_since: None,
             can_ask: false,
-            quiet: Quiet::default(),
             is_over: false,
             took: Duration::ZERO,
             drawn_hash: 0,
@@ -228,12 +214,12 @@ impl Follower {
 
     /// The world here, once it came.
     pub fn replica(&self) -> Option<&Replica> {
-        self.replica.as_ref()
+        self.world.replica.as_ref()
     }
 
     /// The replica, for tests that corrupt it.
     pub fn replica_mut(&mut self) -> Option<&mut Replica> {
-        self.replica.as_mut()
+        self.world.replica.as_mut()
     }
 
     /// The frame that was drawn last, shown or not.
@@ -283,21 +269,21 @@ impl Follower {
         match arrived {
             Arrived::Frame(bytes) => match stamped_packet(bytes) {
                 Ok((epoch, packet)) => {
-                    let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
+                    let (frame, missing) = (packet.frame(), packet.missing(&self.world.bulk));
                     if epoch > self.lock.epoch() {
-                        self.packets.clear();
+                        self.world.packets.clear();
                         self.parked.clear();
                         self.step(DisplayEvent::Release { epoch, frame: 0, is_mine: false }, screen)?;
                     }
                     self.line.ask_for_bulk(missing, Arrived::Bulk);
                     // What comes again is here already.
-                    if epoch == self.lock.epoch() && self.replica.as_ref().is_none_or(|replica| frame > replica.frame()) {
-                        self.packets.insert(frame, packet);
+                    if epoch == self.lock.epoch() && self.world.replica.as_ref().is_none_or(|replica| frame > replica.frame()) {
+                        self.world.packets.insert(frame, packet);
                         self.parked.push_back(Parked::Frame(epoch, frame));
                     }
                 }
                 // What is damaged is a gap: a snapshot closes it.
-                Err(error) => self.complain("a frame", &error.into()),
+                Err(error) => self.world.complain("a frame", &error.into()),
             },
             Arrived::Release(bytes) => match message_of::<Release>(&bytes) {
                 Ok(release) => {
@@ -311,15 +297,15 @@ impl Follower {
                     self.step(DisplayEvent::Release { epoch: release.epoch, frame: release.frame, is_mine }, screen)?;
                     self.is_over |= self.ends_with_application && release.is_last && release.epoch == self.lock.epoch();
                 }
-                Err(error) => self.complain("a release", &error),
+                Err(error) => self.world.complain("a release", &error),
             },
             Arrived::Snapshot(answer) => self.answered(answer)?,
             Arrived::Bulk(hash, Ok(bytes)) => {
                 self.line.bulk_answered(hash);
-                match self.bulk.learn(hash, &bytes) {
+                match self.world.bulk.learn(hash, &bytes) {
                     Ok(()) => self.line.keep_bulk(hash, bytes),
                     Err(error) => {
-                        self.complain("a long value", &error.into());
+                        self.world.complain("a long value", &error.into());
                         // What waits for it is a gap as well.
                         self.parked.clear();
                     }
@@ -363,14 +349,14 @@ impl Follower {
                 self.refused_since = None;
                 match stamped_packet(bytes) {
                     Ok((epoch, packet)) => {
-                        let (frame, missing) = (packet.frame(), packet.missing(&self.bulk));
+                        let (frame, missing) = (packet.frame(), packet.missing(&self.world.bulk));
                         self.line.ask_for_bulk(missing, Arrived::Bulk);
-                        self.snapshot = Some(packet);
+                        self.world.snapshot = Some(packet);
                         self.parked.retain(|parked| matches!(parked, Parked::Frame(..)));
                         self.parked.push_front(Parked::Snapshot(epoch, frame));
                     }
                     // It is asked for again.
-                    Err(error) => self.complain("the world", &error.into()),
+                    Err(error) => self.world.complain("the world", &error.into()),
                 }
             }
             Err(reason) if reason.starts_with("there is a display") => {
@@ -385,29 +371,6 @@ impl Follower {
         Ok(())
     }
 
-    /// Says what came and cannot be used, from where, and where this display stands.
-    fn complain(&mut self, what: &str, error: &ClusterError) {
-        let frame = self
-            .replica
-            .as_ref()
-            .map_or_else(|| "there is no world here yet".into(), |replica| format!("the last frame here is {}", replica.frame()));
-        let words = format!("{what} from {} cannot be used: {error}; {frame}", self.endpoint);
-        if self.quiet.is_news(&words) {
-            tracing::error!("{words}");
-        }
-    }
-
-    fn tell_unknown(&mut self, types: Vec<String>) {
-        for name in types {
-            let words = format!(
-                "the application's node type `{name}` is not known here: its nodes are held, and nothing is drawn for them"
-            );
-            if self.quiet.is_news(&words) {
-                tracing::info!("{words}");
-            }
-        }
-    }
-
     /// Long values are awaited that the world here needs first.
     fn awaits_world(&self) -> bool {
         self.line.awaits_bulk() && self.parked.iter().any(|parked| matches!(parked, Parked::Snapshot(..)))
@@ -417,10 +380,10 @@ impl Follower {
     fn unpark<S: Screen>(&mut self, screen: &mut S) -> Result<(), S::Error> {
         while let Some(parked) = self.parked.front() {
             let packet = match parked {
-                Parked::Frame(_, frame) => self.packets.get(frame),
-                Parked::Snapshot(..) => self.snapshot.as_ref(),
+                Parked::Frame(_, frame) => self.world.packets.get(frame),
+                Parked::Snapshot(..) => self.world.snapshot.as_ref(),
             };
-            if packet.is_some_and(|packet| !packet.missing(&self.bulk).is_empty()) {
+            if packet.is_some_and(|packet| !packet.missing(&self.world.bulk).is_empty()) {
                 return Ok(());
             }
             match self.parked.pop_front() {
@@ -450,20 +413,25 @@ impl Follower {
                             Ok(()) => {}
                             Err(error @ ClusterError::Replica(ReplicaError::OtherField { .. })) => return Err(error.into()),
                             Err(error) => {
-                                self.complain("the world", &error);
+                                self.world.complain("the world", &error);
                                 events.push_back(DisplayEvent::Unusable);
                             }
                         }
-                        self.packets = self.packets.split_off(&(frame + 1));
+                        self.world.packets = self.world.packets.split_off(&frame.saturating_add(1));
                     }
                     DisplayAction::Apply(frame) => events.push_back(self.apply(frame)),
                     DisplayAction::Draw(frame) => {
                         let began = Instant::now();
                         note(&mut self.progress.draws);
-                        if let Some(replica) = &mut self.replica {
+                        if let Some(replica) = &mut self.world.replica {
                             self.drawn_hash = replica.hash_now();
                             self.drawn_frame = frame;
-                            screen.draw(replica.graph(), frame, std::mem::take(&mut self.is_new))?;
+                            let is_new = std::mem::take(&mut self.world.is_new);
+                            let mut draw = || screen.draw(replica.graph(), frame, is_new);
+                            match is_new || self.took > LONG {
+                                true => self.line.meanwhile(draw)?,
+                                false => draw()?,
+                            }
                         }
                         self.took = began.elapsed();
                         note(&mut self.progress.drawn);
@@ -484,7 +452,7 @@ impl Follower {
                         screen.show(frame)?;
                         self.note_shown();
                     }
-                    DisplayAction::Forget => self.packets.clear(),
+                    DisplayAction::Forget => self.world.packets.clear(),
                 }
             }
         }
@@ -501,49 +469,16 @@ impl Follower {
         note(&mut self.progress.shown);
     }
 
-    /// Makes the replica anew. Where the old one was doubted, what differs is told.
     fn restore(&mut self) -> Result<(), ClusterError> {
-        let packet = self.snapshot.take().ok_or_else(|| ClusterError::Message("there is no snapshot".into()))?;
-        let mut fresh = Replica::new(&packet, self.types.clone(), &self.bulk)?;
-        self.tell_unknown(fresh.unknown_types());
-        if let Some(doubted) = self.doubted.take()
-            && doubted.frame() == fresh.frame()
-            && let Some(difference) = doubted.difference(&fresh)
-        {
-            tracing::error!("the world differed, {difference}");
-            self.report.differences.push(difference.to_string());
-        }
-        if !fresh.agrees() {
-            return Err(ClusterError::Message(format!("the world of frame {} is not what its hash says", fresh.frame())));
-        }
+        self.report.differences.extend(self.world.restore()?);
         self.report.snapshots += 1;
         note(&mut self.progress.world);
-        self.replica = Some(fresh);
-        self.is_new = true;
         Ok(())
     }
 
     fn apply(&mut self, frame: u64) -> DisplayEvent {
-        let (Some(packet), Some(replica)) = (self.packets.remove(&frame), &mut self.replica) else {
-            return DisplayEvent::Diverged(frame);
-        };
-        let applied = replica.apply(&packet, &self.bulk);
-        self.line.reuse(packet.into_bytes());
-        match applied {
-            Ok(()) if replica.agrees() => {
-                let unknown = replica.unknown_types();
-                self.tell_unknown(unknown);
-                return DisplayEvent::Applied(frame);
-            }
-            Ok(()) => {
-                tracing::warn!("frame {frame}: the world here is not that of the application; fetching it");
-                self.doubted = self.replica.take();
-            }
-            Err(error) => {
-                self.complain(&format!("frame {frame}"), &error.into());
-                self.replica = None;
-            }
-        }
-        DisplayEvent::Diverged(frame)
+        let (agrees, packet) = self.world.apply(frame);
+        self.line.reuse(packet);
+        if agrees { DisplayEvent::Applied(frame) } else { DisplayEvent::Diverged(frame) }
     }
 }

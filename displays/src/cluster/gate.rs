@@ -12,7 +12,7 @@ use super::lock::{ApplicationAction, ApplicationEvent, ApplicationLock, DisplayI
 use super::message::{Ready, Release, Told, message_of};
 use super::ordered::Inbox;
 use super::outlets::{Outlets, Parcel};
-use super::quiet::Quiet;
+use super::quiet::{Quiet, Words};
 use super::transport::ClusterError;
 use super::waits::Waits;
 
@@ -107,24 +107,7 @@ impl Drop for Entered<'_> {
         let (outlets, log) = (gate.outlets.clone(), std::mem::take(&mut gate.log));
         drop(gate);
         outlets.flush();
-        log.into_iter().for_each(|words| words.tell());
-    }
-}
-
-/// Words for the log.
-enum Words {
-    Info(String),
-    Warn(String),
-    Error(String),
-}
-
-impl Words {
-    fn tell(self) {
-        match self {
-            Words::Info(words) => tracing::info!("{words}"),
-            Words::Warn(words) => tracing::warn!("{words}"),
-            Words::Error(words) => tracing::error!("{words}"),
-        }
+        log.into_iter().for_each(Words::say);
     }
 }
 
@@ -213,7 +196,7 @@ impl Gate {
             None
         };
         if let Some(fault) = fault {
-            return self.complain(&format!("{fault}; it is not listened to"));
+            return self.complain(format!("{fault}; it is not listened to"));
         }
         // Its link broke and came back before it missed a frame.
         let name = self.names.entry(ready.display).or_insert(ready.name);
@@ -244,13 +227,11 @@ impl Gate {
     fn cannot_read(&mut self, what: &str, bytes: &[u8], error: &ClusterError) {
         let (length, frame) = (bytes.len(), self.lock.frame());
         let whom = lines::others(self.lines, |number| self.names.contains_key(&number));
-        self.complain(&format!("{what}, {length} bytes, at frame {frame}: {error}{whom}"));
+        self.complain(format!("{what}, {length} bytes, at frame {frame}: {error}{whom}"));
     }
 
-    fn complain(&mut self, words: &str) {
-        if self.quiet.is_news(words) {
-            self.log.push(Words::Warn(words.into()));
-        }
+    fn complain(&mut self, words: String) {
+        self.log.extend(self.quiet.news(Words::Warn(words)));
     }
 
     /// The line of a display stands.
@@ -269,7 +250,7 @@ impl Gate {
             Some(number) => lines::at(self.lines, number),
             None => lines::others(self.lines, |number| self.names.contains_key(&number)),
         };
-        self.complain(&match number {
+        self.complain(match number {
             Some(_) => format!("a display{whom} is refused: {reason}"),
             None => format!("a display is refused: {reason}{whom}"),
         });
@@ -351,10 +332,11 @@ impl Gate {
                 ApplicationAction::TooSlow { display, times, within_us, took_us } => {
                     let name = self.names.get(&display.0).map_or("?", String::as_str);
                     let (within_s, took_ms) = (within_us as f64 / 1e6, took_us / 1000);
+                    let [timeout_ms, fast_ms] = [self.lock.timeout_us(), self.lock.fast_us()].map(|time_us| time_us / 1000);
                     self.log.push(Words::Warn(format!(
-                        "display `{name}` was late {times} times in {within_s:.1} s: it needs {took_ms} ms for a frame, and {} ms are \
-                         waited; from now on it is waited for less and less often, and shows what it draws in time",
-                        self.lock.timeout_us() / 1000
+                        "display `{name}` was late {times} times in {within_s:.1} s: it needs {took_ms} ms for a frame, and {timeout_ms} ms are \
+                         waited; it is waited for again once it needs less than {fast_ms} ms, and less and less often; meanwhile it shows \
+                         late what it draws"
                     )));
                 }
             }

@@ -8,7 +8,7 @@ use super::event::Event;
 use super::transport::ClusterError;
 
 /// Spoken by both ends; another one is refused.
-pub(super) const PROTOCOL: u16 = 5;
+pub(super) const PROTOCOL: u16 = 6;
 
 pub(super) const FRAME: &str = "umbriel/frame";
 /// Where a frame's packet lies in the application's memory.
@@ -74,8 +74,8 @@ pub(super) struct Word {
     pub(super) made: Vec<(u64, u32, u64)>,
     /// Owner and holder of a lock of nodes.
     pub(super) whose: Vec<(u64, Option<u64>, Option<u64>)>,
-    /// Guest, and what was not done for it.
-    pub(super) refused: Vec<(u64, String)>,
+    /// Guest, a message of it, and what of that was not done.
+    pub(super) refused: Vec<(u64, u64, String)>,
     /// Guest, node, and whether it has the lock.
     pub(super) answers: Vec<(u64, u64, Result<(), String>)>,
 }

@@ -49,6 +49,8 @@ mod short;
 mod transport;
 #[cfg(feature = "cluster")]
 mod waits;
+#[cfg(feature = "cluster")]
+mod world;
 
 #[cfg(feature = "cluster")]
 pub use self::{
@@ -60,7 +62,7 @@ pub use self::{
     host::{Host, HostOptions},
     lines::{Lines, number_of_process},
     proxy::Proxy,
-    quiet::Quiet,
+    quiet::{Quiet, Words},
     transport::{ClusterError, LEASE, Security},
     waits::Waits,
 };

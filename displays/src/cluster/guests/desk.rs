@@ -1,6 +1,6 @@
 //! The host's end: does what guests did, and tells them what became of it.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::time::{Duration, Instant};
 
 use crossbeam::channel::{Receiver, unbounded};
@@ -17,10 +17,12 @@ use crate::cluster::message::{
     DEEDS, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word, bytes_of, message_of,
 };
 use crate::cluster::transport::network;
-use crate::cluster::{ClusterError, Host, Quiet};
+use crate::cluster::{ClusterError, Host, Quiet, Words};
 
 /// How long a guest that cannot be reached keeps its nodes and locks.
 const GRACE: Duration = Duration::from_secs(2);
+/// So many of the deeds that were refused to a guest last are told once more with the world.
+const MOST_REFUSED: usize = 64;
 /// Guests make no more nodes once the world has so many.
 const MOST_NODES: usize = 1_000_000;
 
@@ -46,6 +48,8 @@ pub struct Desk {
     lists: HashMap<GuestId, BTreeSet<(u64, String)>>,
     /// What a guest was last answered about a node, for whom the frame with the answer does not reach.
     answers: BTreeMap<(GuestId, u64), Result<(), String>>,
+    /// What was refused to a guest last, by its messages, for the same.
+    refused: HashMap<GuestId, VecDeque<(u64, String)>>,
     bulk: Bulk,
     changed: BTreeSet<u64>,
     word: Word,
@@ -85,6 +89,7 @@ impl Desk {
             made: HashMap::new(),
             lists: HashMap::new(),
             answers: BTreeMap::new(),
+            refused: HashMap::new(),
             bulk: Bulk::new(),
             changed: BTreeSet::new(),
             word: Word::default(),
@@ -111,10 +116,7 @@ impl Desk {
                         }
                     }
                     Err(error) => {
-                        let words = format!("what an application did, {} bytes: {error}", bytes.len());
-                        if self.quiet.is_news(&words) {
-                            tracing::warn!("{words}");
-                        }
+                        self.quiet.say(Words::Warn(format!("what an application did, {} bytes: {error}", bytes.len())));
                     }
                 },
                 Arrived::Join(query) => self.joins.push(query),
@@ -170,10 +172,7 @@ impl Desk {
             let sent = match answer {
                 Ok(bytes) => query.reply(key, bytes).wait(),
                 Err(reason) => {
-                    let words = format!("an application{at} is refused: {reason}");
-                    if self.quiet.is_news(&words) {
-                        tracing::warn!("{words}");
-                    }
+                    self.quiet.say(Words::Warn(format!("an application{at} is refused: {reason}")));
                     query.reply_err(reason).wait()
                 }
             };
@@ -200,7 +199,9 @@ impl Desk {
         let whose = self.ownership.nodes().map(|node| self.whose(node)).collect();
         let answers = self.answers.range((guest, 0)..=(guest, u64::MAX));
         let answers = answers.map(|((_, node), answer)| (guest.0, *node, answer.clone())).collect();
-        let mut word = Word { made, whose, answers, ..Word::default() };
+        let refused = self.refused.get(&guest).into_iter().flatten();
+        let refused = refused.map(|(number, why)| (guest.0, *number, why.clone())).collect();
+        let mut word = Word { made, whose, answers, refused, ..Word::default() };
         self.head(&mut word, host.epoch(), host.last_frame());
         Ok(bytes_of(&(word, &snapshot[..])))
     }
@@ -226,6 +227,7 @@ impl Desk {
                 OwnershipAction::Departed(guest, name) => {
                     tracing::info!("`{name}` has left the world");
                     self.made.remove(&guest);
+                    self.refused.remove(&guest);
                     self.answers.retain(|(of, _), _| *of != guest);
                     self.tidy(guest, graph);
                 }
@@ -254,7 +256,10 @@ impl Desk {
         }
         for deed in &message.deeds {
             if let Err(why) = self.deed(guest, deed, graph) {
-                self.word.refused.push((guest.0, why));
+                let kept = self.refused.entry(guest).or_default();
+                kept.push_back((message.number, why.clone()));
+                kept.drain(..kept.len().saturating_sub(MOST_REFUSED));
+                self.word.refused.push((guest.0, message.number, why));
             }
         }
         for request in message.requests {
@@ -327,5 +332,51 @@ impl Desk {
             self.step(OwnershipEvent::Deleted(node), graph);
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cluster::{HostOptions, LEASE, Security};
+    use umbriel_fields::{Field, NodeType};
+
+    /// Who missed the frame that says it fetches the world.
+    #[test]
+    fn what_was_refused_is_told_with_the_world() {
+        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let options = HostOptions {
+            listen: format!("tcp/127.0.0.1:{port}"),
+            security: Security::Loopback,
+            timeout: Duration::from_secs(1),
+            lease: LEASE,
+            ahead: true,
+            lines: None,
+        };
+        let mut host = Host::listen(&options).unwrap();
+        let mut desk = Desk::open(&host, "host").unwrap();
+        let mut graph = Graph::new(vec![NodeType::new("Box", "").field(Field::new("size", 1.0f32))]);
+        let node = number_of(graph.create("Box").unwrap());
+        host.frame(&graph, false);
+        let guest = GuestId(7);
+        let refused = |desk: &mut Desk, host: &mut Host, graph: &Graph| {
+            let join = GuestJoin { protocol: PROTOCOL, guest: guest.0, name: "guest".into(), keeps: false };
+            let world = desk.joins(host, graph, join).unwrap();
+            let (word, _) = message_of::<(Word, Vec<u8>)>(&world).unwrap();
+            word.refused.iter().map(|(guest, number, _)| (*guest, *number)).collect::<Vec<_>>()
+        };
+        assert_eq!(refused(&mut desk, &mut host, &graph), []);
+        // Deletes a node of the host's, as it stands in a message.
+        let deletes = || message_of::<Deed>(&bytes_of(&(1u8, node))).unwrap();
+        let last = MOST_REFUSED as u64 + 2;
+        for number in 1..=last {
+            let message = GuestMessage { guest: guest.0, number, deeds: vec![deletes()], images: vec![], requests: vec![] };
+            desk.early.insert((guest, number), message);
+            desk.step(OwnershipEvent::Arrived(guest, number), &mut graph);
+        }
+        desk.publish(&host, &graph);
+        assert_eq!(refused(&mut desk, &mut host, &graph), (3..=last).map(|number| (guest.0, number)).collect::<Vec<_>>());
+        desk.step(OwnershipEvent::Leaves(guest), &mut graph);
+        assert_eq!(refused(&mut desk, &mut host, &graph), []);
     }
 }

@@ -69,6 +69,8 @@ pub struct Whose {
     pub locks: HashMap<NodeId, Arc<str>>,
     /// Answers about locks that were asked for.
     pub answers: Vec<(NodeId, Result<(), String>)>,
+    /// Why something was not done that was told.
+    pub refused: Vec<String>,
 }
 
 /// An application in another one's world.
@@ -380,10 +382,11 @@ impl Guest {
             for (_, key, number) in word.made.iter().filter(|(guest, ..)| *guest == self.line.id) {
                 mirror.made(*key, *number);
             }
-            self.applied = self.applied.max(word.done_of(self.line.id).unwrap_or(0));
-            for (_, why) in word.refused.iter().filter(|(guest, _)| *guest == self.line.id) {
-                tracing::error!("not done: {why}");
+            // What comes with the world may have been told before.
+            for (.., why) in word.refused.iter().filter(|(guest, number, _)| *guest == self.line.id && *number > self.applied) {
+                whose.refused.push(why.clone());
             }
+            self.applied = self.applied.max(word.done_of(self.line.id).unwrap_or(0));
         }
         self.told.confirm(self.applied);
         mirror.follow(replica, graph, self.applied);
@@ -490,7 +493,7 @@ mod tests {
 
     /// The frames with the answers were lost on the way, and the world was fetched instead.
     #[test]
-    fn answers_to_questions_come_with_the_world() {
+    fn answers_and_refusals_come_with_the_world() {
         let fresh = || Graph::new(vec![NodeType::new("Box", "").field(Field::new("size", 1.0f32))]);
         let mut guest = Guest::connect("tcp/127.0.0.1:1", &Security::Loopback, LEASE, "guest", false, fresh).unwrap();
         let (host, mut publisher) = (world(), Publisher::new());
@@ -499,7 +502,11 @@ mod tests {
         let mut fetched = |guest: &mut Guest, applied: u64, answers: Vec<(u64, u64, Result<(), String>)>| {
             publisher.frame(&host);
             let guests = vec![(id, "guest".into(), applied)];
-            let word = Word { epoch: 1, frame: publisher.last_frame(), host: "host".into(), guests, answers, ..Word::default() };
+            // Of each of its messages something was refused.
+            let refused =
+                (1..=applied).flat_map(|number| [(id, number, format!("{number}")), (id + 1, number, "".into())]).collect();
+            let (frame, name) = (publisher.last_frame(), "host".into());
+            let word = Word { epoch: 1, frame, host: name, guests, answers, refused, ..Word::default() };
             let bytes = bytes_of(&(word, stamped(1, publisher.snapshot(&host).unwrap())));
             guest.fetch_again();
             guest.handle(Arrived::World(Ok(bytes))).unwrap();
@@ -519,6 +526,7 @@ mod tests {
             (false, 2, vec![(id + 1, number, Ok(()))], vec![]),
             (false, 2, vec![refused.clone()], vec![(node, refused.2.clone())]),
         ];
+        let mut told = 0;
         for (row, (asks, applied, answers, expected)) in rows.into_iter().enumerate() {
             if asks {
                 guest.tell(&mut graph, &whose, &[Wish::Lock(node)]);
@@ -526,6 +534,9 @@ mod tests {
             assert!(matches!(fetched(&mut guest, applied, answers), News::Frame(_)), "row {row}");
             guest.follow(&mut graph, &mut whose);
             assert_eq!(std::mem::take(&mut whose.answers), expected, "row {row}");
+            let news = (told + 1..=applied).map(|number| format!("{number}")).collect::<Vec<_>>();
+            assert_eq!(std::mem::take(&mut whose.refused), news, "row {row}");
+            told = applied;
         }
     }
 }
