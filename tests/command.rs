@@ -36,7 +36,7 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
     let truncated = folder("command").join("truncated.glb");
     std::fs::write(&truncated, b"glTF\x02\0\0\0\xff\0\0\0").expect("a file can be written");
     // Name, line of the world, what the message must contain. The rest of the world is drawn.
-    let rows: [(&str, &str, &[&str]); 37] = [
+    let rows: [(&str, &str, &[&str]); 40] = [
         (
             "negative_soft_range",
             r#"world.add(make("DirectionalLight", #{ name: "sun", shadows: "volume", soft: "range", soft_range: -1.0 }));"#,
@@ -175,6 +175,24 @@ fn a_mistake_costs_itself_and_says_where_it_is() {
             "caster_without_triangles",
             r#"world.add(shape(make("Mesh", #{ name: "dust", position: [vec3(0,1,0), vec3(1,1,0)], index: [0,1], topology: "lines" }))); world.add(make("DirectionalLight", #{ shadows: "volume" }));"#,
             &["caster_without_triangles.rhai:4", "mesh 'dust' casts no shadow volume: none of its 0 triangles", "`cast_shadow`"],
+        ),
+        (
+            "caster_at_one_place",
+            r#"let p = vec3(1, 1, 0); world.add(shape(make("Mesh", #{ name: "dot", position: [p, p, p, p], index: [0,1,2, 0,2,3] }))); world.add(make("DirectionalLight", #{ shadows: "volume" }));"#,
+            &[
+                "caster_at_one_place.rhai:4",
+                "mesh 'dot' casts no shadow volume: none of its 2 triangles has three places of its own",
+            ],
+        ),
+        (
+            "caster_with_an_index_too_many",
+            r#"world.add(shape(make("Mesh", #{ name: "torn", position: [vec3(0,1,0), vec3(1,1,0), vec3(1,1,1)], index: [0,1,3] }))); world.add(make("DirectionalLight", #{ shadows: "volume" }));"#,
+            &["caster_with_an_index_too_many.rhai:4", "torn", "index 3 at place 2 is outside of its 3 vertices"],
+        ),
+        (
+            "light_inside_of_its_caster",
+            r#"let globe = shape(make("Sphere", #{ radius: 0.3 })); globe.name = "globe"; world.add(globe); world.add(make("PointLight", #{ name: "lamp", location: vec3(0, 0.1, 0), shadows: "volume" }));"#,
+            &["light_inside_of_its_caster.rhai:4:", "light 'lamp' is inside of 'globe', which is closed", "`cast_shadow`"],
         ),
         (
             "vertex_that_is_no_number",

@@ -8,8 +8,8 @@ use crate::lights::{Lights, leaves_holes_to_maps};
 use crate::plan::{BLACK_FILM, Purpose};
 use crate::slots::Slots;
 use crate::stats::Problems;
-use crate::uniforms;
 use crate::volumes::{Cone, Seen, Surface, TurnedBox, VolumeCaster, VolumeJob, VolumeLight};
+use crate::{enclosed, uniforms};
 use glam::{Mat4, Vec3, Vec4};
 use umbriel_scene::{
     Aabb, AlphaMode, Drawable, Light, LightKind, Material, Mesh, Scene, ShadowMethod, StencilGroup, StencilMode, Topology,
@@ -44,17 +44,22 @@ pub(crate) fn jobs(
     let black = films.push(&uniforms::Film { color: [0.0, 0.0, 0.0, 1.0] });
     debug_assert_eq!(black, BLACK_FILM);
     let mut jobs = Jobs::default();
+    problems.begin_standing();
     let is_film = |group: &StencilGroup| matches!(group.mode, StencilMode::Modulative(_));
     if lights.order.len() == lights.in_surface_pass && !scene.stencil_groups.iter().any(is_film) {
         return jobs;
     }
     let draws = things.draws;
     let receivers = receivers(draws.drawn().map(|(i, _)| i), scene);
-    let mut push = |light: VolumeLight, members: &mut dyn Iterator<Item = usize>, purpose: Purpose| {
+    let mut enclosed = Vec::new();
+    let mut push = |source: &Light, light: VolumeLight, members: &mut dyn Iterator<Item = usize>, purpose: Purpose| {
         let (mut casters, mut cutouts) = (Vec::new(), Vec::new());
         for index in members {
             match draws.holed_by(index) {
-                None => casters.extend(things.caster(scene, index)),
+                None => {
+                    casters.extend(things.caster(scene, index));
+                    enclosed.extend(enclosed::problem_of(source, scene, things, index));
+                }
                 Some(material) => cutouts.extend(things.cutout(scene, index, material)),
             }
         }
@@ -68,13 +73,13 @@ pub(crate) fn jobs(
         if light.shadows == ShadowMethod::Volume {
             let takes_holes = !leaves_holes_to_maps(light);
             let casts = |casting| casting == Casting::Whole || casting == Casting::Holed && takes_holes;
-            push(volume, &mut draws.drawn().filter(|(_, casting)| casts(*casting)).map(|(index, _)| index), purpose);
+            push(light, volume, &mut draws.drawn().filter(|(_, casting)| casts(*casting)).map(|(index, _)| index), purpose);
         } else {
             let groups = scene.stencil_groups.iter().filter(|g| g.light == index && g.mode == StencilMode::Additive);
             let mut members: Vec<usize> = groups.flat_map(|g| g.casters.iter().copied()).collect();
             members.sort_unstable();
             members.dedup();
-            push(volume, &mut members.into_iter(), purpose);
+            push(light, volume, &mut members.into_iter(), purpose);
         }
     }
     for group in &scene.stencil_groups {
@@ -97,8 +102,9 @@ pub(crate) fn jobs(
         let film = films.push(&uniforms::Film { color: [r * a, g * a, b * a, a] });
         // A film darkens what is outside of the cone too.
         let everywhere = VolumeLight { cone: None, ..volume_light(light) };
-        push(everywhere, &mut group.casters.iter().copied(), Purpose::Film { film, light: group.light });
+        push(light, everywhere, &mut group.casters.iter().copied(), Purpose::Film { film, light: group.light });
     }
+    enclosed.into_iter().for_each(|message| problems.report_standing(message));
     jobs
 }
 

@@ -15,6 +15,7 @@ mod cull;
 mod cutouts;
 mod deform;
 mod draws;
+mod enclosed;
 mod error;
 mod gpu;
 mod handover;

@@ -62,6 +62,9 @@ pub struct MapShare {
 pub(crate) struct Problems {
     told: HashSet<String>,
     untold: Vec<String>,
+    /// What comes and goes: of the last frame, and of this one so far.
+    stood: HashSet<String>,
+    stands: HashSet<String>,
 }
 
 impl Problems {
@@ -78,7 +81,37 @@ impl Problems {
         }
     }
 
+    /// A frame begins, in which all that still stands is reported again.
+    pub(crate) fn begin_standing(&mut self) {
+        self.stood = std::mem::take(&mut self.stands);
+    }
+
+    /// The same for what is looked at in every frame: it is told when it was not so in the frame before.
+    pub(crate) fn report_standing(&mut self, message: String) {
+        if !self.stood.contains(&message) {
+            self.report_again(message.clone());
+        }
+        self.stands.insert(message);
+    }
+
     pub(crate) fn drain(&mut self) -> Vec<String> {
         std::mem::take(&mut self.untold)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_is_told_when_it_comes() {
+        let mut problems = Problems::default();
+        let told = |stands: &[&str]| {
+            problems.begin_standing();
+            stands.iter().for_each(|message| problems.report_standing((*message).to_owned()));
+            problems.drain()
+        };
+        let frames: [&[&str]; 5] = [&["a", "a"], &["a", "b"], &["b"], &[], &["a", "b"]];
+        assert_eq!(frames.map(told), [vec!["a"], vec!["b"], vec![], vec![], vec!["a", "b"]]);
     }
 }

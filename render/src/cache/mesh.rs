@@ -1,7 +1,8 @@
 //! Vertices on the GPU.
 
 use crate::deform::{Sources, make_sources};
-use umbriel_scene::{Mesh, Topology};
+use std::sync::OnceLock;
+use umbriel_scene::{Edges, Mesh, Topology};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BufferUsages, VertexAttribute, VertexBufferLayout, VertexFormat, VertexStepMode};
 
@@ -21,6 +22,14 @@ pub(crate) struct GpuMesh {
     pub(crate) least_alpha: f32,
     /// Skin and morph targets, where it has any.
     pub(crate) sources: Option<Sources>,
+    is_closed: OnceLock<bool>,
+}
+
+impl GpuMesh {
+    /// See [`Edges::closed`]. `mesh` is the one that it was made of.
+    pub(crate) fn is_closed(&self, mesh: &Mesh) -> bool {
+        *self.is_closed.get_or_init(|| Edges::of_mesh(mesh).closed)
+    }
 }
 
 /// Layout of the vertex buffers: positions, frames, attributes, and the instances that a view sees.
@@ -91,5 +100,6 @@ pub(crate) fn make_mesh(device: &wgpu::Device, mesh: &Mesh) -> Result<GpuMesh, S
         topology: mesh.topology,
         least_alpha: mesh.colors.iter().map(|c| c.w).fold(1.0, f32::min),
         sources: make_sources(device, mesh),
+        is_closed: OnceLock::new(),
     })
 }

@@ -6,6 +6,7 @@ mod contours;
 mod cutouts;
 mod deformation;
 mod device;
+mod enclosed;
 mod layouts;
 mod lights;
 mod maps;

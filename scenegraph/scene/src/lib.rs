@@ -28,6 +28,7 @@ mod tangents;
 mod trace;
 mod view;
 mod volume;
+mod winding;
 
 pub use adjacency::{Edge, Edges};
 pub use bounds::Aabb;
