@@ -35,8 +35,9 @@ pub(crate) const SURFACE_BEFORE_HOOKS: &[&str] = &[
 /// What a shape's own shader may replace; see [`crate::author`].
 pub(crate) const HOOKS: &str = include_str!("shaders/hooks.wgsl");
 
-/// Layers need the surface's fragment, which shaders of authors do not see.
-pub(crate) const SURFACE_BEHIND_HOOKS: &str = concat!(include_str!("shaders/layers.wgsl"), include_str!("surface.wgsl"));
+/// Layers and holes need the surface's fragment, which shaders of authors do not see.
+pub(crate) const SURFACE_BEHIND_HOOKS: &str =
+    concat!(include_str!("shaders/layers.wgsl"), include_str!("shaders/holes.wgsl"), include_str!("surface.wgsl"));
 
 /// WGSL of surfaces that bring no shader of their own, as the renderer compiles it: for programs that measure themselves
 /// against it.

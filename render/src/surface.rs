@@ -239,7 +239,7 @@ fn pipeline(
     samples: Samples,
 ) -> wgpu::RenderPipeline {
     let entry = match (pass, kind.alpha) {
-        (Pass::Base | Pass::BaseLit | Pass::BaseInShadow, Alpha::Mask) => "masked",
+        (Pass::Base, Alpha::Mask) => "masked",
         (Pass::Base | Pass::BaseLit | Pass::BaseInShadow, _) => "opaque",
         (Pass::Depth, Alpha::Mask) => "holes",
         (Pass::Blend, _) => "blended",
@@ -247,6 +247,7 @@ fn pipeline(
         (Pass::AddSoft, _) => "added_soft",
         (Pass::VisibilitySoft, _) => "visibility_soft",
         (Pass::AddInShadow, _) => "added_in_shadow",
+        (Pass::Visibility, Alpha::Mask) => "visibility_masked",
         (Pass::Visibility | Pass::VisibilityAdd, _) => "visibility",
         (Pass::Depth | Pass::Mark | Pass::Exempt, _) => "nothing",
     };
@@ -284,6 +285,7 @@ fn pipeline(
         ("LISTS", f64::from(u8::from(frame.lists))),
         ("FOG", f64::from(frame.fog)),
         ("LIGHTS", f64::from(lights)),
+        ("HOLES", if kind.alpha == Alpha::Mask { f64::from(samples.count()) } else { 0.0 }),
     ];
     let compilation_options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {

@@ -1,5 +1,6 @@
 // Surfaces as the eye sees them. Concatenated after shaders/{position,view,instance,material,light,shade,brdf,
-// shadow_map,shadow_filter,shadow_disc,projection}, the functions that a shape's own shader may replace (`author/`), and shaders/layers.
+// shadow_map,shadow_filter,shadow_disc,projection}, the functions that a shape's own shader may replace (`author/`), and
+// shaders/{layers,holes}.
 
 struct Vertex {
     @location(0) position: vec3<f32>,
@@ -46,12 +47,19 @@ fn vertex(v: Vertex) -> Fragment {
     return f;
 }
 
+// Alpha as the material has it, before layers and a shape's own shader.
+var<private> own_alpha: f32;
+
 // What all variants need to know. `covered` are the pixel's samples that are on the shape. Called in uniform control flow: it
 // takes derivatives.
 fn place(f: Fragment, covered: u32) -> Surface {
     load_params();
     var s: Surface;
     s.base_color = base_color_at(f.uv0, f.uv1, f.color);
+    if HOLES > 1u {
+        s.base_color = color_there(look_of(f), s.base_color, f.color, covered);
+    }
+    own_alpha = s.base_color.a;
     s.emissive = material.emissive;
     if has_texture(4u) {
         s.emissive *= textureSample(emissive_texture, emissive_sampler, texture_place(4u, f.uv0, f.uv1)).rgb;
@@ -117,8 +125,6 @@ fn samples_of(covered: u32) -> vec4<f32> {
     }
     return vec4<f32>((vec4<u32>(covered) >> vec4<u32>(0u, 1u, 2u, 3u)) & vec4<u32>(1u));
 }
-
-const ALL_SAMPLES = 15u;
 
 // Normal from the normal texture; where the mesh has no tangents they follow from the texture coordinates
 // (Mikkelsen 2020, Surface gradient-based bump mapping, section 3: the cotangent frame).
@@ -216,6 +222,24 @@ fn base(s: Surface, flags: u32) -> vec4<f32> {
     return vec4<f32>(mix(color.rgb, frame.fog_color, fog_share(s.distance)), color.a);
 }
 
+// Which samples of a shape with holes are there. Layers and a shape's own shader are asked once per pixel, and where they
+// make another alpha, so much is decided for all of it.
+fn kept(f: Fragment, s: Surface, covered: u32) -> u32 {
+    var there = covered;
+    if HOLES > 1u {
+        there = samples_there(look_of(f), covered);
+    }
+    if s.base_color.a < material.alpha_cutoff {
+        return 0u;
+    }
+    return select(covered, there, s.base_color.a == own_alpha);
+}
+
+struct Kept {
+    @location(0) color: vec4<f32>,
+    @builtin(sample_mask) samples: u32,
+};
+
 // Opaque surfaces: ambient and emitted light, and the view's lights.
 @fragment
 fn opaque(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
@@ -223,14 +247,15 @@ fn opaque(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<
     return vec4<f32>(base(s, f.flags).rgb, 1.0);
 }
 
-// The same with holes.
+// The same where holes are not in depth yet.
 @fragment
-fn masked(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
+fn masked(f: Fragment, @builtin(sample_mask) covered: u32) -> Kept {
     let s = place(f, covered);
-    if s.base_color.a < material.alpha_cutoff {
+    let samples = kept(f, s, covered);
+    if samples == 0u {
         discard;
     }
-    return vec4<f32>(base(s, f.flags).rgb, 1.0);
+    return Kept(vec4<f32>(base(s, f.flags).rgb, 1.0), samples);
 }
 
 // Mixed over what is behind: premultiplied.
@@ -245,7 +270,7 @@ fn blended(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4
 // The view's lights alone, to be added to what is there.
 fn addition(f: Fragment, covered: u32, shadow: f32) -> vec4<f32> {
     let s = place(f, covered);
-    if s.is_unlit || (material.alpha_mode == MASK && s.base_color.a < material.alpha_cutoff) {
+    if s.is_unlit {
         discard;
     }
     return vec4<f32>(finished_addition(s, reflected(s, f.flags, shadow)) * (1.0 - fog_share(s.distance)), 0.0);
@@ -265,11 +290,6 @@ fn added_in_shadow(f: Fragment, @builtin(sample_mask) covered: u32) -> @location
 // Share of one light that a map lets through. Cone, distance and orientation do not count.
 fn share_through_map(f: Fragment, covered: u32) -> vec4<f32> {
     let s = place(f, covered);
-    // A picture that measures: holes are where rays find them, whatever smaller pictures of them show from afar.
-    let alpha = select(s.base_color.a, full_size_alpha(f.uv0, f.uv1, f.color.a), material.layer_count == 0u);
-    if material.alpha_mode == MASK && alpha < material.alpha_cutoff {
-        discard;
-    }
     // Light that is added outside of its shadow volumes starts from black.
     if view.light_count == 0u {
         return vec4<f32>(0.0, 0.0, 0.0, 1.0);
@@ -285,6 +305,24 @@ fn share_through_map(f: Fragment, covered: u32) -> vec4<f32> {
 @fragment
 fn visibility(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
     return share_through_map(f, covered);
+}
+
+// The same where holes are not in depth yet. A picture that measures has them where rays find them.
+@fragment
+fn visibility_masked(f: Fragment, @builtin(sample_mask) covered: u32) -> Kept {
+    var samples = covered;
+    if material.layer_count > 0u {
+        samples = kept(f, place(f, covered), covered);
+    } else if HOLES > 1u {
+        samples = samples_there_at_full_size(look_of(f), covered);
+    } else if full_size_alpha(f.uv0, f.uv1, f.color.a) < material.alpha_cutoff {
+        samples = 0u;
+    }
+    let share = share_through_map(f, samples);
+    if samples == 0u {
+        discard;
+    }
+    return Kept(share, samples);
 }
 
 // Share of the view's one light that its shadow texture shows.
@@ -309,11 +347,12 @@ fn visibility_soft(f: Fragment, @builtin(sample_mask) covered: u32) -> @location
 
 // Depth of what has holes.
 @fragment
-fn holes(f: Fragment) -> @location(0) vec4<f32> {
-    if place(f, ALL_SAMPLES).base_color.a < material.alpha_cutoff {
+fn holes(f: Fragment, @builtin(sample_mask) covered: u32) -> Kept {
+    let samples = kept(f, place(f, covered), covered);
+    if samples == 0u {
         discard;
     }
-    return vec4<f32>(0.0);
+    return Kept(vec4<f32>(0.0), samples);
 }
 
 // For what it does to depth or stencil.

@@ -108,6 +108,53 @@ fn alpha_cuts_holes() {
     }
 }
 
+/// Each sample of a pixel asks alpha at its own place, whatever passes light it and whoever wrote its shader. What layers or a shaders'
+/// author make of alpha is asked once.
+#[test]
+fn edges_that_alpha_cuts_are_smooth() {
+    // A ramp of alpha: half of the card is there, beyond a slanted line.
+    let rgba: Vec<u8> = (0..64).flat_map(|i| [255, 255, 255, (4 * i + 1) as u8]).collect();
+    let image = Arc::new(Image { width: 64, height: 1, rgba: rgba.into() });
+    let sampler = Sampler { wrap_u: Wrap::Clamp, ..Default::default() };
+    let uv_from_mesh = glam::Affine2::from_translation(glam::Vec2::splat(0.5))
+        * glam::Affine2::from_angle(0.4)
+        * glam::Affine2::from_translation(glam::Vec2::splat(-0.5));
+    let texture = TextureRef { image, sampler, uv_set: 0, uv_from_mesh };
+    let lit = |texture: Option<TextureRef>, text: Option<&str>| {
+        let source = |text: &str| Arc::new(ShaderSource { name: "own.wgsl".into(), text: text.into() });
+        let shader = text.map(|text| FragmentShader { source: source(text), params: vec![] });
+        Material { base_color_texture: texture, alpha: AlphaMode::Mask { cutoff: 0.5 }, shader, ..matt(1.0, 1.0, 1.0) }
+    };
+    let same = "fn surface(s: Surface) -> Surface { return s; }";
+    let own =
+        "fn surface(s: Surface) -> Surface { var t = s; t.base_color.a = f32(s.pixel.x + 0.3 * s.pixel.y > 40.0); return t; }";
+    let rows = [
+        ("plain", lit(Some(texture.clone()), None), true),
+        ("same", lit(Some(texture.clone()), Some(same)), true),
+        ("own", lit(None, Some(own)), false),
+        ("own, with a texture", lit(Some(texture.clone()), Some(own)), false),
+    ];
+    for (name, material, is_smooth) in rows {
+        for (shadows, ambient) in [(ShadowMethod::None, 1.0), (ShadowMethod::Volume, 0.0), (ShadowMethod::Volume, 1.0)] {
+            let light = Light { direction: Vec3::NEG_Z, shadows, ..noon() };
+            let drawables = vec![card(material.clone(), 0.0, 8.0)].into();
+            let lights = if ambient == 1.0 && shadows == ShadowMethod::None { vec![] } else { vec![light.clone(), light] };
+            let mut scene = Scene { drawables, lights, ambient: Vec3::splat(0.2 * ambient), ..Default::default() };
+            let mut drawn = |samples| {
+                scene.samples = samples;
+                let shot = shoot(&scene, &ahead("smooth"));
+                assert_eq!(shot.problems, Vec::<String>::new(), "{name}");
+                let full = shot.layers[0].rgba.chunks(4).map(|p| p[0]).max().unwrap();
+                let part = shot.layers[0].rgba.chunks(4).filter(|p| p[0] > 0 && p[0] < full).count();
+                (part, shot.layers[0].rgba.chunks(4).filter(|p| p[0] == full).count())
+            };
+            let [(rough, one), (smooth, four)] = [Samples::One, Samples::Four].map(&mut drawn);
+            let what = format!("{name}, {shadows:?}, {ambient}: {rough} {one} {smooth} {four}");
+            assert!(one > 200 && four > 200 && rough == 0 && (smooth > 20) == is_smooth, "{what}");
+        }
+    }
+}
+
 #[test]
 fn textures_are_looked_up_where_they_should() {
     let texel = |x: u32, y: u32| [x * 255, y * 255, 0].map(|v| v as u8);
