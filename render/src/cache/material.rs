@@ -32,7 +32,8 @@ struct Picture {
 
 /// Makes materials, sharing pictures and samplers among them.
 pub(crate) struct MaterialCache {
-    pictures: HashMap<(usize, bool), std::sync::Weak<Picture>>,
+    /// By address, by what their bytes mean, and by the alpha that they are cut off at.
+    pictures: HashMap<(usize, bool, Option<u32>), std::sync::Weak<Picture>>,
     samplers: HashMap<Sampler, wgpu::Sampler>,
     white: Arc<Picture>,
 }
@@ -40,7 +41,7 @@ pub(crate) struct MaterialCache {
 impl MaterialCache {
     pub(crate) fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<MaterialCache, String> {
         let image = Image { width: 1, height: 1, rgba: Arc::new([255; 4]) };
-        let white = Arc::new(Picture { view: make_texture(device, queue, &image, false)?, _image: None });
+        let white = Arc::new(Picture { view: make_texture(device, queue, &image, false, None)?, _image: None });
         Ok(MaterialCache { pictures: HashMap::new(), samplers: HashMap::new(), white })
     }
 
@@ -68,7 +69,8 @@ impl MaterialCache {
         for (i, (texture, srgb)) in slots.into_iter().chain(layers).enumerate() {
             let sampler = texture.map(|t| t.sampler).unwrap_or_default();
             let sampler = self.samplers.entry(sampler).or_insert_with(|| make_sampler(device, sampler)).clone();
-            let picture = texture.and_then(|t| match self.picture(device, queue, &t.image, srgb) {
+            let cutoff = if i == 0 { cutoff_of(material) } else { None };
+            let picture = texture.and_then(|t| match self.picture(device, queue, &t.image, srgb, cutoff) {
                 Ok(picture) => Some((picture, slot_of(t))),
                 Err(message) => {
                     report(format!("material '{}': {message}", material.name));
@@ -120,16 +122,23 @@ impl MaterialCache {
         queue: &wgpu::Queue,
         image: &Arc<Image>,
         srgb: bool,
+        cutoff: Option<f32>,
     ) -> Result<Arc<Picture>, String> {
-        let key = (Arc::as_ptr(image) as usize, srgb);
+        let key = (Arc::as_ptr(image) as usize, srgb, cutoff.map(f32::to_bits));
         if let Some(picture) = self.pictures.get(&key).and_then(|p| p.upgrade()) {
             return Ok(picture);
         }
-        let view = make_texture(device, queue, image, srgb)?;
+        let view = make_texture(device, queue, image, srgb, cutoff)?;
         let picture = Arc::new(Picture { view, _image: Some(image.clone()) });
         self.pictures.insert(key, Arc::downgrade(&picture));
         Ok(picture)
     }
+}
+
+/// Where the base colour's picture has less alpha, the material is not there; none where that is nowhere or everywhere.
+fn cutoff_of(material: &Material) -> Option<f32> {
+    let AlphaMode::Mask { cutoff } = material.alpha else { return None };
+    Some(cutoff / material.base_color.w).filter(|cutoff| *cutoff > 0.0 && *cutoff <= 1.0)
 }
 
 /// Only looked for where it cuts holes. Layers may do anything to it.

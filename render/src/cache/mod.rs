@@ -1,5 +1,6 @@
 //! What stays on the GPU from frame to frame, recognised by the identity of its `Arc`.
 
+mod coverage;
 mod material;
 mod mesh;
 mod slab;

@@ -1,13 +1,16 @@
 //! Pictures on the GPU, with smaller copies made here.
 
+use super::coverage::Alphas;
 use umbriel_scene::{Filter, Image, Sampler, Wrap};
 
-/// Sends a picture to the GPU; `srgb` says what its bytes mean. Wrong sizes give a message.
+/// Sends a picture to the GPU; `srgb` says what its bytes mean. Where it cuts holes, smaller copies have as much of it above `cutoff` as
+/// the picture itself. Wrong sizes give a message.
 pub(crate) fn make_texture(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
     image: &Image,
     srgb: bool,
+    cutoff: Option<f32>,
 ) -> Result<wgpu::TextureView, String> {
     let (width, height) = (image.width, image.height);
     let limit = device.limits().max_texture_dimension_2d;
@@ -30,9 +33,12 @@ pub(crate) fn make_texture(
     });
     write_level(queue, &texture, 0, width, height, &image.rgba);
     let mut level = Level { width, height, texels: image.rgba.chunks_exact(4).map(|p| decode(p, srgb)).collect() };
+    let covered =
+        cutoff.map(|cutoff| (cutoff, level.alphas().coverage(cutoff))).filter(|(_, share)| *share > 0.0 && *share < 1.0);
     for mip in 1..levels {
         level = level.halved();
-        let bytes: Vec<u8> = level.texels.iter().flat_map(|p| encode(*p, srgb)).collect();
+        let scale = covered.map_or(1.0, |(cutoff, share)| level.alphas().scale(cutoff, share));
+        let bytes: Vec<u8> = level.texels.iter().flat_map(|p| encode(*p, srgb, scale)).collect();
         write_level(queue, &texture, mip, level.width, level.height, &bytes);
     }
     Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
@@ -46,6 +52,10 @@ struct Level {
 }
 
 impl Level {
+    fn alphas(&self) -> Alphas {
+        Alphas { width: self.width, height: self.height, texels: self.texels.iter().map(|p| p[3]).collect() }
+    }
+
     fn halved(&self) -> Level {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let mut texels = Vec::with_capacity((width * height) as usize);
@@ -74,15 +84,16 @@ fn decode(p: &[u8], srgb: bool) -> [f32; 4] {
     [r * a, g * a, b * a, a]
 }
 
-fn encode([r, g, b, a]: [f32; 4], srgb: bool) -> [u8; 4] {
+/// The bytes of a texel, its alpha times `scale`.
+fn encode([r, g, b, a]: [f32; 4], srgb: bool, scale: f32) -> [u8; 4] {
     let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
     if !srgb {
-        return [r, g, b, a].map(byte);
+        return [r, g, b, a * scale].map(byte);
     }
     let curve = |v: f32| if v <= 0.0031308 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
     let back = if a > 0.0 { 1.0 / a } else { 0.0 };
     let [r, g, b] = [r, g, b].map(|v| byte(curve(v * back)));
-    [r, g, b, byte(a)]
+    [r, g, b, byte(a * scale)]
 }
 
 fn write_level(queue: &wgpu::Queue, texture: &wgpu::Texture, mip_level: u32, width: u32, height: u32, bytes: &[u8]) {
@@ -127,9 +138,9 @@ mod tests {
         let level =
             |bytes: &[u8], srgb| Level { width: 2, height: 1, texels: bytes.chunks(4).map(|p| decode(p, srgb)).collect() };
         let white_and_black = [255, 255, 255, 255, 0, 0, 0, 255];
-        assert_eq!(encode(level(&white_and_black, true).halved().texels[0], true), [188, 188, 188, 255]);
-        assert_eq!(encode(level(&white_and_black, false).halved().texels[0], false), [128, 128, 128, 255]);
+        assert_eq!(encode(level(&white_and_black, true).halved().texels[0], true, 1.0), [188, 188, 188, 255]);
+        assert_eq!(encode(level(&white_and_black, false).halved().texels[0], false, 1.0), [128, 128, 128, 255]);
         let red_and_nothing = [255, 0, 0, 255, 0, 255, 0, 0];
-        assert_eq!(encode(level(&red_and_nothing, true).halved().texels[0], true), [255, 0, 0, 128]);
+        assert_eq!(encode(level(&red_and_nothing, true).halved().texels[0], true, 1.0), [255, 0, 0, 128]);
     }
 }

@@ -155,6 +155,34 @@ fn edges_that_alpha_cuts_are_smooth() {
     }
 }
 
+/// The share of a net that its wires fill stays what it is, from where a texel is large to where a mesh is.
+#[test]
+fn nets_keep_their_wires_from_afar() {
+    let wire = |i: u32| (14..17).contains(&(i % 32));
+    let rgba: Vec<u8> =
+        (0..128 * 128).flat_map(|i| [255, 255, 255, if wire(i % 128) || wire(i / 128) { 255 } else { 0 }]).collect();
+    let image = Arc::new(Image { width: 128, height: 128, rgba: rgba.into() });
+    let texture = |uv_from_mesh| TextureRef { image: image.clone(), sampler: Sampler::default(), uv_set: 0, uv_from_mesh };
+    let turned = glam::Affine2::from_angle(0.3);
+    for samples in [Samples::One, Samples::Four] {
+        let shares = [1.0f32, 2.0, 4.0, 8.0, 16.0].map(|times| {
+            let uv_from_mesh = glam::Affine2::from_scale(Vec2::splat(times)) * turned;
+            let material = Material {
+                base_color_texture: Some(texture(uv_from_mesh)),
+                alpha: AlphaMode::Mask { cutoff: 0.5 },
+                ..unlit(1.0, 1.0, 1.0, 1.0)
+            };
+            let scene = Scene { drawables: vec![card(material, 0.0, 8.0)].into(), samples, ..Default::default() };
+            let name = format!("net_{}_{times}", samples.count());
+            let shot = shoot(&scene, &Picture::mono(look(&name, Vec3::new(0.0, 0.0, 5.0), Vec3::ZERO, [256, 256])));
+            let linear = |p: &[u8]| (f32::from(p[0]) / 255.0).powf(2.2);
+            shot.layers[0].rgba.chunks(4).map(linear).sum::<f32>() / (256.0 * 256.0)
+        });
+        println!("{samples:?}: {shares:?}");
+        assert!(shares.iter().all(|share| (share / shares[0] - 1.0).abs() < 0.25), "{samples:?}: {shares:?}");
+    }
+}
+
 #[test]
 fn textures_are_looked_up_where_they_should() {
     let texel = |x: u32, y: u32| [x * 255, y * 255, 0].map(|v| v as u8);
