@@ -44,7 +44,8 @@ pub(crate) fn make_texture(
     Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
 }
 
-/// Linear colour, premultiplied by alpha where it is a colour, so that what is not there does not bleed.
+/// Linear colour, premultiplied by alpha where it is a colour, so that what is not there does not bleed. Where nothing is there at all, the
+/// colours under it are kept: filters mix them with what is there beside them.
 struct Level {
     width: u32,
     height: u32,
@@ -81,8 +82,12 @@ fn decode(p: &[u8], srgb: bool) -> [f32; 4] {
         return [r, g, b, a];
     }
     let [r, g, b] = [r, g, b].map(|v| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) });
+    let a = a.max(LEAST_ALPHA);
     [r * a, g * a, b * a, a]
 }
+
+/// Too little to be seen beside anything that is there.
+const LEAST_ALPHA: f32 = 1e-5;
 
 /// The bytes of a texel, its alpha times `scale`.
 fn encode([r, g, b, a]: [f32; 4], srgb: bool, scale: f32) -> [u8; 4] {
@@ -91,8 +96,7 @@ fn encode([r, g, b, a]: [f32; 4], srgb: bool, scale: f32) -> [u8; 4] {
         return [r, g, b, a * scale].map(byte);
     }
     let curve = |v: f32| if v <= 0.0031308 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-    let back = if a > 0.0 { 1.0 / a } else { 0.0 };
-    let [r, g, b] = [r, g, b].map(|v| byte(curve(v * back)));
+    let [r, g, b] = [r, g, b].map(|v| byte(curve(v / a)));
     [r, g, b, byte(a * scale)]
 }
 
@@ -142,5 +146,7 @@ mod tests {
         assert_eq!(encode(level(&white_and_black, false).halved().texels[0], false, 1.0), [128, 128, 128, 255]);
         let red_and_nothing = [255, 0, 0, 255, 0, 255, 0, 0];
         assert_eq!(encode(level(&red_and_nothing, true).halved().texels[0], true, 1.0), [255, 0, 0, 128]);
+        let green_and_nothing = [0, 255, 0, 0, 0, 255, 0, 0];
+        assert_eq!(encode(level(&green_and_nothing, true).halved().texels[0], true, 1.0), [0, 255, 0, 0]);
     }
 }
