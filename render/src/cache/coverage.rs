@@ -16,33 +16,45 @@ pub(super) struct Alphas {
 impl Alphas {
     /// Share of the area that is above the cutoff.
     pub(super) fn coverage(&self, cutoff: f32) -> f32 {
-        let seen = self.seen();
-        seen.iter().filter(|alpha| **alpha >= cutoff).count() as f32 / seen.len() as f32
+        let (mut all, mut above) = (0u32, 0u32);
+        self.look(|alpha| {
+            all += 1;
+            above += u32::from(alpha >= cutoff);
+        });
+        above as f32 / all as f32
     }
 
     /// What alphas have to be multiplied by, so that this share of the area is above the cutoff, or as near to it as can be.
     pub(super) fn scale(&self, cutoff: f32, coverage: f32) -> f32 {
-        let mut seen = self.seen();
-        seen.sort_unstable_by(|a, b| b.total_cmp(a));
+        let mut seen = Vec::new();
+        self.look(|alpha| seen.push(alpha));
         let wanted = (coverage * seen.len() as f32).round() as usize;
+        let last = seen.len() - 1;
+        let at = *seen.select_nth_unstable_by(wanted.min(last), |a, b| b.total_cmp(a)).1;
         // Equal alphas stay together, on the side where fewer of them are wrong.
-        let at = seen[wanted.min(seen.len() - 1)];
-        let (before, after) = (seen.partition_point(|a| *a > at), seen.partition_point(|a| *a >= at));
-        let count = if wanted - before <= after - wanted.min(after) { before } else { after };
-        let limit = match (count.checked_sub(1).map(|last| seen[last]), seen.get(count)) {
-            (Some(last), Some(next)) => 0.5 * (last + next),
-            (Some(last), None) => 0.5 * last,
-            (None, _) => 2.0 * at,
+        let above = seen.iter().filter(|a| **a > at).count();
+        let below = seen.iter().filter(|a| **a < at).count();
+        let is_left_out = 2 * wanted <= above + seen.len() - below;
+        let limit = if is_left_out {
+            let next = seen.iter().copied().filter(|a| *a > at).reduce(f32::min);
+            0.5 * (at + next.unwrap_or(3.0 * at))
+        } else {
+            let next = seen.iter().copied().filter(|a| *a < at).reduce(f32::max);
+            0.5 * (at + next.unwrap_or(0.0))
         };
         if limit > 0.0 { cutoff / limit } else { 1.0 }
     }
 
-    fn seen(&self) -> Vec<f32> {
-        let (columns, rows) = (places(self.width), places(self.height));
-        let texel = |x: u32, y: u32| self.texels[(y * self.width + x) as usize];
-        let row = |y: u32, &(left, right, part): &(u32, u32, f32)| texel(left, y) * (1.0 - part) + texel(right, y) * part;
-        let at = |&(above, below, part): &(u32, u32, f32), column| row(above, column) * (1.0 - part) + row(below, column) * part;
-        rows.iter().flat_map(|row| columns.iter().map(move |column| at(row, column))).collect()
+    fn look(&self, mut take: impl FnMut(f32)) {
+        let columns = places(self.width);
+        for (above, below, down) in places(self.height) {
+            let row = |y: u32| &self.texels[(y * self.width) as usize..][..self.width as usize];
+            let (above, below) = (row(above), row(below));
+            for (left, right, across) in &columns {
+                let mix = |row: &[f32]| row[*left as usize] * (1.0 - across) + row[*right as usize] * across;
+                take(mix(above) * (1.0 - down) + mix(below) * down);
+            }
+        }
     }
 }
 
