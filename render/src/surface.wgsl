@@ -235,6 +235,11 @@ fn kept(f: Fragment, s: Surface, covered: u32) -> u32 {
     return select(covered, there, s.base_color.a == own_alpha);
 }
 
+// Of two shapes in one place, depth does not tell which of them is in a pixel.
+fn is_hole(s: Surface) -> bool {
+    return HOLES > 0u && s.base_color.a < material.alpha_cutoff;
+}
+
 struct Kept {
     @location(0) color: vec4<f32>,
     @builtin(sample_mask) samples: u32,
@@ -244,6 +249,9 @@ struct Kept {
 @fragment
 fn opaque(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<f32> {
     let s = place(f, covered);
+    if is_hole(s) {
+        discard;
+    }
     return vec4<f32>(base(s, f.flags).rgb, 1.0);
 }
 
@@ -270,7 +278,7 @@ fn blended(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4
 // The view's lights alone, to be added to what is there.
 fn addition(f: Fragment, covered: u32, shadow: f32) -> vec4<f32> {
     let s = place(f, covered);
-    if s.is_unlit {
+    if s.is_unlit || is_hole(s) {
         discard;
     }
     return vec4<f32>(finished_addition(s, reflected(s, f.flags, shadow)) * (1.0 - fog_share(s.distance)), 0.0);

@@ -155,6 +155,28 @@ fn edges_that_alpha_cuts_are_smooth() {
     }
 }
 
+/// Two cards in one place, each with a hole where the other one is.
+#[test]
+fn what_is_in_the_hole_of_another_keeps_its_look() {
+    let half = |rgb: [u8; 3], side: u32| {
+        let rgba: Vec<u8> = (0..64).flat_map(|i| [rgb[0], rgb[1], rgb[2], if i / 32 == side { 255 } else { 0 }]).collect();
+        let image = Arc::new(Image { width: 64, height: 1, rgba: rgba.into() });
+        let sampler = Sampler { filter: Filter::Nearest, mip_maps: false, ..Default::default() };
+        let texture = TextureRef { image, sampler, uv_set: 0, uv_from_mesh: Default::default() };
+        let alpha = AlphaMode::Mask { cutoff: 0.5 };
+        card(Material { base_color_texture: Some(texture), alpha, ..matt(1.0, 1.0, 1.0) }, 0.0, 8.0)
+    };
+    let light = Light { direction: Vec3::NEG_Z, shadows: ShadowMethod::Volume, ..noon() };
+    for (samples, lights) in [(Samples::One, 1), (Samples::Four, 1), (Samples::One, 2), (Samples::Four, 2)] {
+        let light = Light { intensity: light.intensity / lights as f32, ..light.clone() };
+        let drawables = vec![half([255, 0, 0], 0), half([0, 255, 0], 1)].into();
+        let scene = Scene { drawables, lights: vec![light; lights], samples, ..Default::default() };
+        let shot = shoot(&scene, &ahead("in_the_hole"));
+        assert_colour(shot.pixel(16, 32), [1.0, 0.0, 0.0], "the left one");
+        assert_colour(shot.pixel(48, 32), [0.0, 1.0, 0.0], "the right one");
+    }
+}
+
 /// The share of a net that its wires fill stays what it is, from where a texel is large to where a mesh is.
 #[test]
 fn nets_keep_their_wires_from_afar() {
