@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use umbriel_displays::cluster::{
-    CacheOptions, ClusterError, Event, Follower, FollowerOptions, Guest, Host, HostOptions, LEASE, Proxy, Screen, Security,
-    make_certificates,
+    CacheOptions, ClusterError, Desk, Event, Follower, FollowerOptions, Guest, Host, HostOptions, LEASE, News, Proxy, Screen,
+    Security, make_certificates,
 };
 use umbriel_displays::navigation::Input as Motion;
 use umbriel_fields::Graph;
@@ -215,6 +215,60 @@ fn a_display_that_is_always_too_slow_shows_late_what_it_draws_and_fetches_the_wo
         let shown = &slow.seen.shown;
         assert!(shown.len() >= 4 && shown.iter().all(|(frame, x)| *x == *frame as f32), "{shown:?}");
         assert_eq!((display.report().snapshots, report.dropped, report.disagreed), (1, 0, 0));
+    });
+}
+
+/// Its line breaks for longer than it may be silent, and is back before it is given up.
+#[test]
+fn a_guest_that_begins_anew_is_heard_from_its_first_message_on() {
+    const MESSAGES: u64 = 5;
+    let port = free_port();
+    let proxy = Proxy::start(std::net::SocketAddr::from(([127, 0, 0, 1], port))).unwrap();
+    let (end, there) = (AtomicBool::new(false), [const { AtomicU64::new(0) }; 2]);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let mut graph = new_graph();
+            let mut host = Host::listen(&host_options(&format!("tcp/127.0.0.1:{port}"))).unwrap();
+            let mut desk = Desk::open(&host, "host").unwrap();
+            while !end.load(Ordering::Relaxed) {
+                desk.begin(&mut graph);
+                desk.publish(&host, &graph);
+                host.frame(&graph, false);
+                desk.welcome(&mut host, &graph);
+                for (run, count) in there.iter().enumerate() {
+                    let found = (0..MESSAGES).filter(|number| graph.find(&format!("{run} {number}")).is_some()).count();
+                    count.store(found as u64, Ordering::Relaxed);
+                }
+                host.wait_until(&graph, Instant::now() + Duration::from_millis(5));
+            }
+        });
+        let endpoint = format!("tcp/127.0.0.1:{}", proxy.port());
+        let mut guest = Guest::connect(&endpoint, &Security::Loopback, LEASE, "visitor", false, new_graph).unwrap();
+        let mut follow_until = |run: usize, expected: [u64; 2]| {
+            let (mut world, started) = (None, Instant::now());
+            let counts = || there.each_ref().map(|count| count.load(Ordering::Relaxed));
+            while (world.is_none() || counts() != expected) && started.elapsed() < Duration::from_secs(20) {
+                match (guest.next(Duration::from_millis(10)).unwrap(), &mut world) {
+                    (News::Begins, _) => {
+                        let (mut graph, whose) = guest.enter();
+                        for number in 0..MESSAGES {
+                            let node = graph.create("Transform").unwrap();
+                            graph.set_name(node, &format!("{run} {number}")).unwrap();
+                            guest.tell(&mut graph, &whose, &[]);
+                        }
+                        world = Some((graph, whose));
+                    }
+                    (News::Frame(_), Some((graph, whose))) => guest.follow(graph, whose),
+                    _ => {}
+                }
+            }
+            counts()
+        };
+        let first = follow_until(0, [MESSAGES, 0]);
+        proxy.cut(LEASE + Duration::from_millis(500));
+        let second = follow_until(1, [0, MESSAGES]);
+        end.store(true, Ordering::Relaxed);
+        assert_eq!((first, second), ([MESSAGES, 0], [0, MESSAGES]));
     });
 }
 

@@ -37,6 +37,8 @@ pub(super) const GUEST: &str = "umbriel/guest";
 pub(super) struct GuestJoin {
     pub(super) protocol: u16,
     pub(super) guest: u64,
+    /// How often it began anew: what it did before is not its own any more.
+    pub(super) run: u64,
     pub(super) name: String,
     pub(super) keeps: bool,
 }
@@ -45,7 +47,8 @@ pub(super) struct GuestJoin {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct GuestMessage {
     pub(super) guest: u64,
-    /// Counts from one.
+    pub(super) run: u64,
+    /// Counts from one in each run.
     pub(super) number: u64,
     pub(super) deeds: Vec<Deed>,
     pub(super) images: Vec<(u64, Vec<u8>)>,

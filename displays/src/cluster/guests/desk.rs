@@ -42,6 +42,8 @@ pub struct Desk {
     /// Messages that wait for one before them.
     early: BTreeMap<(GuestId, u64), GuestMessage>,
     joins: Vec<Query>,
+    /// How often a guest had begun anew when it was let in.
+    runs: HashMap<GuestId, u64>,
     /// The nodes of a guest by its own keys.
     made: HashMap<GuestId, HashMap<u32, u64>>,
     /// Nodes in whose lists a guest has put its own, by field.
@@ -86,6 +88,7 @@ impl Desk {
             started: Instant::now(),
             early: BTreeMap::new(),
             joins: Vec::new(),
+            runs: HashMap::new(),
             made: HashMap::new(),
             lists: HashMap::new(),
             answers: BTreeMap::new(),
@@ -110,7 +113,7 @@ impl Desk {
                 Arrived::Message(bytes) => match message_of::<GuestMessage>(&bytes) {
                     Ok(message) => {
                         let (guest, number) = (GuestId(message.guest), message.number);
-                        if self.ownership.has(guest) {
+                        if self.ownership.has(guest) && self.runs.get(&guest) == Some(&message.run) {
                             self.early.insert((guest, number), message);
                             self.step(OwnershipEvent::Arrived(guest, number), graph);
                         }
@@ -119,7 +122,12 @@ impl Desk {
                         self.quiet.say(Words::Warn(format!("what an application did, {} bytes: {error}", bytes.len())));
                     }
                 },
-                Arrived::Join(query) => self.joins.push(query),
+                Arrived::Join(query) => {
+                    if let Ok(join) = query.payload().map_or(Err(()), |join| message_of(&join.to_bytes()).map_err(drop)) {
+                        self.begins(&join, graph);
+                    }
+                    self.joins.push(query);
+                }
                 Arrived::Token(guest, true) => self.step(OwnershipEvent::Found(GuestId(guest)), graph),
                 Arrived::Token(guest, false) => self.step(OwnershipEvent::Lost(GuestId(guest)), graph),
             }
@@ -127,6 +135,15 @@ impl Desk {
         self.step(OwnershipEvent::Tick, graph);
         let taken: BTreeMap<GuestId, u64> = self.ownership.members().map(|(guest, _, taken)| (guest, taken)).collect();
         self.early.retain(|(guest, number), _| taken.get(guest).is_some_and(|taken| number > taken));
+    }
+
+    /// A guest that lost sight of its world and begins anew leaves first, whether it was missed here or not.
+    fn begins(&mut self, join: &GuestJoin, graph: &mut Graph) {
+        let guest = GuestId(join.guest);
+        if self.ownership.has(guest) && self.runs.get(&guest).is_some_and(|run| *run < join.run) {
+            self.early.retain(|(of, _), _| *of != guest);
+            self.step(OwnershipEvent::Leaves(guest), graph);
+        }
     }
 
     /// Tells guests what belongs to the next frame. To be called after evaluation, before the frame is published.
@@ -194,6 +211,7 @@ impl Desk {
         if !self.ownership.has(guest) {
             tracing::info!("`{}` joins the world at frame {}", join.name, host.last_frame());
         }
+        self.runs.insert(guest, join.run);
         self.ownership.step(self.now_us(), OwnershipEvent::Joins { guest, name: join.name, keeps: join.keeps });
         let made = self.made.entry(guest).or_default().iter().map(|(key, number)| (guest.0, *key, *number)).collect();
         let whose = self.ownership.nodes().map(|node| self.whose(node)).collect();
@@ -227,6 +245,7 @@ impl Desk {
                 OwnershipAction::Departed(guest, name) => {
                     tracing::info!("`{name}` has left the world");
                     self.made.remove(&guest);
+                    self.runs.remove(&guest);
                     self.refused.remove(&guest);
                     self.answers.retain(|(of, _), _| *of != guest);
                     self.tidy(guest, graph);
@@ -360,7 +379,7 @@ mod tests {
         host.frame(&graph, false);
         let guest = GuestId(7);
         let refused = |desk: &mut Desk, host: &mut Host, graph: &Graph| {
-            let join = GuestJoin { protocol: PROTOCOL, guest: guest.0, name: "guest".into(), keeps: false };
+            let join = GuestJoin { protocol: PROTOCOL, guest: guest.0, run: 0, name: "guest".into(), keeps: false };
             let world = desk.joins(host, graph, join).unwrap();
             let (word, _) = message_of::<(Word, Vec<u8>)>(&world).unwrap();
             word.refused.iter().map(|(guest, number, _)| (*guest, *number)).collect::<Vec<_>>()
@@ -370,7 +389,8 @@ mod tests {
         let deletes = || message_of::<Deed>(&bytes_of(&(1u8, node))).unwrap();
         let last = MOST_REFUSED as u64 + 2;
         for number in 1..=last {
-            let message = GuestMessage { guest: guest.0, number, deeds: vec![deletes()], images: vec![], requests: vec![] };
+            let message =
+                GuestMessage { guest: guest.0, run: 0, number, deeds: vec![deletes()], images: vec![], requests: vec![] };
             desk.early.insert((guest, number), message);
             desk.step(OwnershipEvent::Arrived(guest, number), &mut graph);
         }

@@ -85,6 +85,8 @@ pub struct Guest {
     types: TypeRegistry,
     bulk: Bulk,
     epoch: u64,
+    /// How often it began anew.
+    run: u64,
     replica: Option<Replica>,
     mirror: Option<Mirror>,
     /// A snapshot that waits for long values.
@@ -131,6 +133,7 @@ impl Guest {
             types: TypeRegistry::new(),
             bulk: Bulk::new(),
             epoch: 0,
+            run: 0,
             replica: None,
             mirror: None,
             world: None,
@@ -263,6 +266,7 @@ impl Guest {
 
     /// What was here is another world's.
     fn forget(&mut self) {
+        self.run += u64::from(self.mirror.is_some());
         (self.replica, self.mirror, self.world) = (None, None, None);
         self.packets.clear();
         self.words.clear();
@@ -282,7 +286,8 @@ impl Guest {
         let waits = self.replica.is_none() && self.world.is_none() && !self.is_leaving;
         if waits && self.asked.is_none_or(|asked| asked.elapsed() > ASK) {
             self.asked = Some(Instant::now());
-            let join = GuestJoin { protocol: PROTOCOL, guest: self.line.id, name: self.name.to_string(), keeps: self.keeps };
+            let (guest, run, name) = (self.line.id, self.run, self.name.to_string());
+            let join = GuestJoin { protocol: PROTOCOL, guest, run, name, keeps: self.keeps };
             self.line.get(GUEST_SNAPSHOT.into(), bytes_of(&join), Arrived::World);
         }
     }
@@ -454,7 +459,7 @@ impl Guest {
 
     fn send(&mut self, deeds: Vec<umbriel_fields::replica::Deed>, images: Vec<(u64, Vec<u8>)>, requests: Vec<GuestRequest>) {
         let number = self.told.next();
-        let bytes = bytes_of(&GuestMessage { guest: self.line.id, number, deeds, images, requests });
+        let bytes = bytes_of(&GuestMessage { guest: self.line.id, run: self.run, number, deeds, images, requests });
         if let Err(error) = self.deeds.put(bytes.clone()).wait() {
             tracing::debug!("cannot tell: {error}");
         }
