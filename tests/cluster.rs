@@ -75,7 +75,7 @@ fn a_display_that_the_world_takes_away_waits_until_it_is_there_again() {
     std::fs::write(&path, COMES_AND_GOES).expect("a world can be written");
     let run = umbriel(&["cluster", path.to_str().unwrap(), "--frames", "20"]);
     let text = format!("{}{}", run.stdout, run.stderr);
-    for part in ["the last picture of `wand/1` stays until it is there again", "wand/1: shown=19", "wand/1 süd: shown=19"] {
+    for part in ["the last picture of `wand/1` stays until it is there again", "wand/1: shown=20", "wand/1 süd: shown=20"] {
         assert!(text.contains(part), "{part:?} is missing in:\n{text}");
     }
     assert!(run.ok, "{text}");
