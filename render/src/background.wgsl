@@ -20,5 +20,5 @@ fn sky(@builtin(vertex_index) index: u32) -> Sky {
 fn background(f: Sky) -> @location(0) vec4<f32> {
     let up = normalize(f.ray).y;
     let away = select(f.nadir, f.zenith, up >= 0.0);
-    return vec4<f32>(mix(f.horizon, away, abs(up)), 1.0);
+    return vec4<f32>(exposed(mix(f.horizon, away, abs(up))), 1.0);
 }

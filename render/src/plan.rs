@@ -3,11 +3,12 @@
 use crate::author::STANDARD;
 use crate::draws::{Draw, Draws, Found};
 use crate::lights::{Lights, falls_on};
-use crate::sheets::Sheets;
+use crate::sheets::{self, Sheets};
 use crate::slots::Slots;
 use crate::soft::SoftJob;
 use crate::stats::{FrameStats, Problems};
 use crate::surface::Pass;
+use crate::targets::Canvas;
 use crate::volumes::Sight;
 use crate::{jobs, uniforms};
 use glam::{Mat4, Vec3};
@@ -108,6 +109,21 @@ impl ViewPlan {
             (false, false) => Pass::Add,
             (false, true) => Pass::AddSoft,
         }
+    }
+}
+
+/// What a frame without lines and half-transparent shapes is drawn in: straight in the picture, where that is the only one, with its views in a
+/// row, and no place of it is shaded by one light after the other or more than once.
+pub(crate) fn canvas(samples: Samples, pictures: &[Picture], jobs: &jobs::Jobs, soft: &[Option<SoftJob>], limit: u32) -> Canvas {
+    let is_shaded_once = match &jobs.purposes[..] {
+        [] => true,
+        [Purpose::Light(_)] => soft[0].is_none() && jobs.cutouts.iter().all(|job| job.cutouts.is_empty()),
+        _ => false,
+    };
+    let is_row = |picture: &Picture| sheets::is_row(picture) && picture.views.iter().all(|v| what_is_wrong(v, limit).is_none());
+    match pictures {
+        [picture] if is_shaded_once && samples == Samples::One && is_row(picture) => Canvas::Picture,
+        _ => Canvas::Linear,
     }
 }
 

@@ -14,7 +14,7 @@ use crate::slots::Slots;
 use crate::soft::{SoftPass, SoftTarget};
 use crate::stats::FrameStats;
 use crate::surface::{Pass, Surface};
-use crate::targets::{Layer, ViewTarget};
+use crate::targets::{Canvas, Layer, Linear, ViewTarget};
 use crate::uniforms;
 use crate::volumes::VolumePass;
 use umbriel_scene::{Material, Mesh};
@@ -103,6 +103,8 @@ pub(crate) struct Recorder<'a> {
     pub(crate) lighting: Option<&'a wgpu::BindGroup>,
     pub(crate) clock: &'a Clock,
     pub(crate) handover: &'a Handover,
+    /// The picture that views are drawn in, where that is not linear light.
+    pub(crate) picture: Option<&'a wgpu::TextureView>,
     pub(crate) stats: &'a mut FrameStats,
 }
 
@@ -126,7 +128,7 @@ impl Recorder<'_> {
         }
         let reads_depth = self.seen_depth(views, to).is_some();
         let part = |is_first, is_last| Part { is_first, is_last, keeps_stencil: false };
-        let mut pass = begin_part(encoder, self.clock, "views", to, part(true, !reads_depth));
+        let mut pass = self.begin_part(encoder, "views", to, part(true, !reads_depth));
         if reads_depth {
             for view in views {
                 enter(&mut pass, view);
@@ -134,7 +136,7 @@ impl Recorder<'_> {
             }
             drop(pass);
             copy_depth(encoder, to);
-            pass = begin_part(encoder, self.clock, "shadow volumes", to, part(false, true));
+            pass = self.begin_part(encoder, "shadow volumes", to, part(false, true));
         }
         for (place, view) in views.iter().enumerate() {
             enter(&mut pass, view);
@@ -162,13 +164,13 @@ impl Recorder<'_> {
     /// One view with soft shadows, which read in a pass what one before it counted.
     fn soft_view(&mut self, encoder: &mut wgpu::CommandEncoder, view: &ViewPlan, to: &ViewTarget) {
         let part = |is_last| Part { is_first: false, is_last, keeps_stencil: false };
-        let mut pass = begin_part(encoder, self.clock, "surfaces", to, Part { is_first: true, ..part(false) });
+        let mut pass = self.begin_part(encoder, "surfaces", to, Part { is_first: true, ..part(false) });
         self.depth_and_base(&mut pass, view);
         let reads_depth = self.seen_depth(std::slice::from_ref(view), to).is_some();
         if reads_depth {
             drop(pass);
             copy_depth(encoder, to);
-            pass = begin_part(encoder, self.clock, "shadow volumes", to, part(false));
+            pass = self.begin_part(encoder, "shadow volumes", to, part(false));
         }
         for (number, step) in view.steps.iter().enumerate() {
             let is_last = number + 1 == view.steps.len();
@@ -180,7 +182,7 @@ impl Recorder<'_> {
             // The stencil starts empty, so the first volumes may be counted in the pass that is open.
             if number > 0 {
                 drop(pass);
-                pass = begin_part(encoder, self.clock, "shadow volumes", to, part(is_last));
+                pass = self.begin_part(encoder, "shadow volumes", to, part(is_last));
             }
             self.hard_step(&mut pass, (view, to), step, number == 0);
         }
@@ -192,9 +194,12 @@ impl Recorder<'_> {
         pass.set_bind_group(0, self.views.group(view.base_slot), &[]);
         self.surfaces(pass, &view.opaque, view.first_pass);
         if !view.is_visibility {
-            pass.set_pipeline(&self.screen.background);
-            pass.set_bind_group(1, self.lighting, &[]);
-            pass.draw(0..3, 0..1);
+            let canvas = if self.picture.is_some() { Canvas::Picture } else { Canvas::Linear };
+            if let Some(background) = self.screen.background(canvas) {
+                pass.set_pipeline(background);
+                pass.set_bind_group(1, self.lighting, &[]);
+                pass.draw(0..3, 0..1);
+            }
         }
     }
 
@@ -286,7 +291,7 @@ impl Recorder<'_> {
     ) -> wgpu::RenderPass<'e> {
         for (number, &job) in layers.iter().enumerate() {
             let part = Part { is_last: false, keeps_stencil: true, ..last };
-            let mut pass = begin_part(encoder, self.clock, "shadow volumes", to, part);
+            let mut pass = self.begin_part(encoder, "shadow volumes", to, part);
             self.count(&mut pass, (view, to), (job, &step.exempt));
             drop(pass);
             self.soft.draw(self.device, encoder, self.clock, (job, self.views.group(view.base_slot)), (soft, number == 0));
@@ -295,14 +300,51 @@ impl Recorder<'_> {
         let soft_view = self.soft.passes.view_group(self.device, self.views.binding(slot), soft);
         if let Then::Film { slot } = step.then {
             let groups = (&soft_view, self.films.group(slot));
-            self.soft.passes.film(self.device, encoder, self.clock, groups, (soft, to.colour()));
+            if let Some(linear) = &to.linear {
+                self.soft.passes.film(self.device, encoder, self.clock, groups, (soft, linear.colour()));
+            }
         }
-        let mut pass = begin_part(encoder, self.clock, "soft light", to, last);
+        let mut pass = self.begin_part(encoder, "soft light", to, last);
         if let Then::Light { .. } = step.then {
             pass.set_bind_group(0, &soft_view, &[]);
             self.surfaces(&mut pass, &view.opaque, view.add_pass(true));
         }
         pass
+    }
+
+    /// A pass into a sheet. The first fills depth, later ones read it and start with an empty stencil; the last resolves.
+    fn begin_part<'e>(
+        &self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        label: &'static str,
+        to: &ViewTarget,
+        part: Part,
+    ) -> wgpu::RenderPass<'e> {
+        let kept = |is_kept| if is_kept { StoreOp::Store } else { StoreOp::Discard };
+        let store = kept(!part.is_last);
+        let (colour, mean) = match (self.picture, &to.linear) {
+            (Some(picture), _) => (Some(picture), None),
+            (None, linear) => (linear.as_ref().map(Linear::colour), linear.as_ref().and_then(Linear::resolve_target)),
+        };
+        let resolve_target = mean.filter(|_| part.is_last);
+        let is_resolved = resolve_target.is_some();
+        let load = if part.is_first { LoadOp::Clear(wgpu::Color::BLACK) } else { LoadOp::Load };
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some(label),
+            timestamp_writes: self.clock.render(label),
+            color_attachments: &[colour.map(|view| wgpu::RenderPassColorAttachment {
+                view,
+                depth_slice: None,
+                resolve_target,
+                ops: Operations { load, store: kept(!is_resolved) },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &to.depth,
+                depth_ops: part.is_first.then_some(Operations { load: LoadOp::Clear(0.0), store }),
+                stencil_ops: Some(Operations { load: LoadOp::Clear(0), store: kept(part.keeps_stencil) }),
+            }),
+            ..Default::default()
+        })
     }
 
     fn surfaces(&mut self, pass: &mut wgpu::RenderPass<'_>, draws: &[Draw], kind_of_pass: Pass) {
@@ -324,11 +366,13 @@ impl Recorder<'_> {
         to: &Layer,
         is_first: bool,
     ) {
+        let Some(linear) = &from.linear else { return };
         let is_visibility = views[0].is_visibility;
         let (target, pipelines) =
             if is_visibility { (&to.plain, &self.screen.plain) } else { (&to.encoding, &self.screen.exposed) };
         let mut pass = begin_colour(encoder, self.clock.render("compose"), target, is_first);
-        pass.set_bind_group(1, &from.group, &[]);
+        pass.set_bind_group(1, &linear.group, &[]);
+        self.stats.composed += views.len() as u32;
         for view in views {
             let r = view.rect;
             pass.set_viewport(r.x as f32, r.y as f32, r.width as f32, r.height as f32, 0.0, 1.0);
@@ -390,35 +434,4 @@ struct Part {
     is_last: bool,
     /// A later pass reads what is counted here.
     keeps_stencil: bool,
-}
-
-/// A pass into a sheet. The first fills depth, later ones read it and start with an empty stencil; the last resolves.
-fn begin_part<'e>(
-    encoder: &'e mut wgpu::CommandEncoder,
-    clock: &Clock,
-    label: &'static str,
-    to: &ViewTarget,
-    part: Part,
-) -> wgpu::RenderPass<'e> {
-    let kept = |is_kept| if is_kept { StoreOp::Store } else { StoreOp::Discard };
-    let store = kept(!part.is_last);
-    let resolve_target = to.resolve_target().filter(|_| part.is_last);
-    let is_resolved = resolve_target.is_some();
-    let load = if part.is_first { LoadOp::Clear(wgpu::Color::BLACK) } else { LoadOp::Load };
-    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some(label),
-        timestamp_writes: clock.render(label),
-        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-            view: to.colour(),
-            depth_slice: None,
-            resolve_target,
-            ops: Operations { load, store: kept(!is_resolved) },
-        })],
-        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-            view: &to.depth,
-            depth_ops: part.is_first.then_some(Operations { load: LoadOp::Clear(0.0), store }),
-            stencil_ops: Some(Operations { load: LoadOp::Clear(0), store: kept(part.keeps_stencil) }),
-        }),
-        ..Default::default()
-    })
 }

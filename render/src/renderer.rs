@@ -5,7 +5,7 @@ use crate::clock::Clock;
 use crate::contours::Contours;
 use crate::cutouts::Cutouts;
 use crate::deform::Deformer;
-use crate::draws::{Caches, Draw, Draws};
+use crate::draws::{Alpha, Caches, Draw, Draws, Kind};
 use crate::handover::Handover;
 use crate::jobs::Jobs;
 use crate::layouts::Layouts;
@@ -23,7 +23,7 @@ use crate::soft::{self, SoftJob, SoftPass};
 use crate::start::joined;
 use crate::stats::{FrameStats, Problems};
 use crate::surface::{FrameNeeds, Pass, Surface};
-use crate::targets::{Target, ViewTargets};
+use crate::targets::{Canvas, SheetNeeds, Target, ViewTargets};
 use crate::volumes::{Depth, VolumePass};
 use crate::{Error, Gpu, buffer::GrowBuffer, gpu, jobs, surroundings, uniforms};
 use glam::Vec3;
@@ -149,12 +149,14 @@ impl Renderer {
         let contours = self.contours.places();
         let light_uniforms: Vec<uniforms::Light> =
             lights.all().map(|i| lights::uniform_of(&scene.lights[i], self.maps.faces_of(i))).collect();
-        self.surface.set_frame(FrameNeeds::new(
-            scene,
-            &light_uniforms[..lights.order.len()],
-            &lights,
-            !self.maps.faces.is_empty(),
-        ));
+        let adds_light = |kind: Kind| kind.alpha == Alpha::Blend || self.surface.shades_shadow(kind.shader);
+        let limit = self.gpu.device.limits().max_texture_dimension_2d;
+        let is_mixed = !contours.is_empty() || self.draws.batches().iter().any(|batch| adds_light(batch.kind));
+        let canvas = if is_mixed { Canvas::Linear } else { plan::canvas(scene.samples, all, &jobs, &soft, limit) };
+        self.volumes.set_colour_format(&self.gpu.device, Some(canvas.format()));
+        self.screen.make_background(&self.gpu.device, canvas);
+        let shone = &light_uniforms[..lights.order.len()];
+        self.surface.set_frame(FrameNeeds::new(scene, shone, &lights, !self.maps.faces.is_empty(), canvas));
         let frame = plan::Frame {
             scene,
             lights: &lights,
@@ -164,13 +166,13 @@ impl Renderer {
             contours: &contours,
             bounds_depth: self.gpu.is_software(),
         };
-        let (plans, sheets) = self.plan_views(pictures, &frame, &mut stats);
+        let (plans, sheets) = self.plan_views(pictures, &frame, canvas, &mut stats);
         self.maps.prepare(&self.gpu.device, &mut self.views, &mut self.draws);
         let lists = projection::lists(scene, pictures, &lights, &self.maps, casters);
         self.upload(scene, (lights.order.len(), &light_uniforms), &lists);
         let prepared = Instant::now();
 
-        self.record((&plans, &sheets), (&jobs, &soft), &mut stats);
+        self.record((&plans, &sheets, canvas), (&jobs, &soft), &mut stats);
         self.drop_unused();
         stats.maps = self.maps.faces.len() as u32;
         stats.map_shares.clone_from(&self.maps.shares);
@@ -263,7 +265,13 @@ impl Renderer {
         casters
     }
 
-    fn plan_views(&mut self, pictures: &[Picture], frame: &plan::Frame<'_>, stats: &mut FrameStats) -> (Vec<ViewPlan>, Sheets) {
+    fn plan_views(
+        &mut self,
+        pictures: &[Picture],
+        frame: &plan::Frame<'_>,
+        canvas: Canvas,
+        stats: &mut FrameStats,
+    ) -> (Vec<ViewPlan>, Sheets) {
         let device = &self.gpu.device;
         let limit = device.limits().max_texture_dimension_2d;
         let (mut plans, mut sheets) = (Vec::new(), Sheets::default());
@@ -314,7 +322,8 @@ impl Renderer {
             let (views, others) = rest.split_at(sheet.views);
             rest = others;
             let steps = || views.iter().flat_map(|view: &ViewPlan| &view.steps);
-            let needs = (steps().any(|s| s.soft.is_some()), steps().any(|s| self.cutouts.any(s.job)));
+            let (is_soft, has_cutouts) = (steps().any(|s| s.soft.is_some()), steps().any(|s| self.cutouts.any(s.job)));
+            let needs = SheetNeeds { canvas, is_soft, has_cutouts };
             self.view_targets.make(device, &self.layouts.picture, sheet.size, self.samples, needs, self.frame);
         }
         (plans, sheets)
@@ -333,7 +342,7 @@ impl Renderer {
     /// Records and submits: deformation, volumes, maps, views.
     fn record(
         &mut self,
-        (plans, sheets): (&[ViewPlan], &Sheets),
+        (plans, sheets, canvas): (&[ViewPlan], &Sheets, Canvas),
         (jobs, soft): (&Jobs, &[Option<SoftJob>]),
         stats: &mut FrameStats,
     ) {
@@ -366,6 +375,7 @@ impl Renderer {
             lighting: self.lighting.group(),
             clock: &self.clock,
             handover: &self.handover,
+            picture: None,
             stats,
         };
         recorder.maps(&mut encoder, &self.maps);
@@ -375,6 +385,11 @@ impl Renderer {
             let (views, others) = rest.split_at(sheet.views);
             rest = others;
             let Some(target) = self.view_targets.get(sheet.size) else { continue };
+            if canvas == Canvas::Picture {
+                recorder.picture = self.targets[views[0].picture].as_ref().map(|to| &to.layers[0].encoding);
+                recorder.sheet(&mut encoder, views, target);
+                continue;
+            }
             recorder.sheet(&mut encoder, views, target);
             for views in views.chunk_by(|a, b| (a.picture, a.layer) == (b.picture, b.layer)) {
                 let place = (views[0].picture, views[0].layer);

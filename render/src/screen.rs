@@ -4,7 +4,7 @@ use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT};
 use crate::layouts::Layouts;
 use crate::shaders;
 use crate::surface::replacing;
-use crate::targets::{PICTURE_FORMAT, PICTURE_FORMAT_SRGB};
+use crate::targets::{Canvas, PICTURE_FORMAT, PICTURE_FORMAT_SRGB};
 use std::collections::HashMap;
 use umbriel_scene::Samples;
 use wgpu::{ColorWrites, CompareFunction};
@@ -12,7 +12,9 @@ use wgpu::{ColorWrites, CompareFunction};
 /// Pipelines that need no vertices.
 pub(crate) struct Screen {
     /// Where depth is still 0.
-    pub(crate) background: wgpu::RenderPipeline,
+    backgrounds: HashMap<Canvas, wgpu::RenderPipeline>,
+    background_layout: wgpu::PipelineLayout,
+    samples: Samples,
     /// On surfaces where the stencil is not 0.
     pub(crate) film: wgpu::RenderPipeline,
     /// Sets the stencil to its reference.
@@ -47,16 +49,14 @@ impl Screen {
         let stencil = wgpu::StencilState { front: in_shadow, back: in_shadow, read_mask: 0xff, write_mask: 0 };
         let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         let compose = |entry, format| {
-            MASKS.map(|mask| pipeline(device, (&compose_layout, &compose_module), ["of_view", entry], (format, None, mask), None))
+            MASKS.map(|mask| {
+                pipeline(device, (&compose_layout, &compose_module), ["of_view", entry], (format, None, mask), None, &[])
+            })
         };
         Screen {
-            background: pipeline(
-                device,
-                (&background_layout, &shaders::module(device, "background", &[&shaders::background()])),
-                ["sky", "background"],
-                (LINEAR_FORMAT, None, ColorWrites::ALL),
-                Some((samples, CompareFunction::Equal, wgpu::StencilState::default())),
-            ),
+            backgrounds: HashMap::new(),
+            background_layout,
+            samples,
             film: pipeline(
                 device,
                 (&film_layout, &shaders::module(device, "film", shaders::FILM)),
@@ -64,6 +64,7 @@ impl Screen {
                 (LINEAR_FORMAT, over, ColorWrites::ALL),
                 // Depth of the film is 0, infinitely far: it passes where there is a surface.
                 Some((samples, CompareFunction::Less, stencil)),
+                &[],
             ),
             fill_stencil: pipeline(
                 device,
@@ -71,6 +72,7 @@ impl Screen {
                 ["fullscreen", "tint"],
                 (LINEAR_FORMAT, None, ColorWrites::empty()),
                 Some((samples, CompareFunction::Always, replacing())),
+                &[],
             ),
             exposed: compose("exposed", PICTURE_FORMAT_SRGB),
             plain: compose("plain", PICTURE_FORMAT),
@@ -80,11 +82,31 @@ impl Screen {
         }
     }
 
+    /// Makes what [`Screen::background`] gives.
+    pub(crate) fn make_background(&mut self, device: &wgpu::Device, canvas: Canvas) {
+        self.backgrounds.entry(canvas).or_insert_with(|| {
+            let constants = [("IS_PICTURE", f64::from(u8::from(canvas == Canvas::Picture)))];
+            pipeline(
+                device,
+                (&self.background_layout, &shaders::module(device, "background", &[&shaders::background()])),
+                ["sky", "background"],
+                (canvas.format(), None, ColorWrites::ALL),
+                Some((self.samples, CompareFunction::Equal, wgpu::StencilState::default())),
+                &constants,
+            )
+        });
+    }
+
+    /// The pipeline that fills what depth leaves open.
+    pub(crate) fn background(&self, canvas: Canvas) -> Option<&wgpu::RenderPipeline> {
+        self.backgrounds.get(&canvas)
+    }
+
     /// The pipeline that shows finished pictures on a surface of this format.
     pub(crate) fn blit(&mut self, device: &wgpu::Device, format: wgpu::TextureFormat) -> &wgpu::RenderPipeline {
         self.blits.entry(format).or_insert_with(|| {
             let target = (format, None, ColorWrites::ALL);
-            pipeline(device, (&self.blit_layout, &self.compose_module), ["whole", "plain"], target, None)
+            pipeline(device, (&self.blit_layout, &self.compose_module), ["whole", "plain"], target, None, &[])
         })
     }
 }
@@ -95,9 +117,10 @@ fn pipeline(
     [vertex, fragment]: [&str; 2],
     (format, blend, write_mask): (wgpu::TextureFormat, Option<wgpu::BlendState>, ColorWrites),
     over: Option<(Samples, CompareFunction, wgpu::StencilState)>,
+    constants: &[(&str, f64)],
 ) -> wgpu::RenderPipeline {
     let count = over.as_ref().map_or(1, |(samples, ..)| samples.count());
-    let compilation_options = wgpu::PipelineCompilationOptions::default();
+    let compilation_options = wgpu::PipelineCompilationOptions { constants, ..Default::default() };
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(fragment),
         layout: Some(layout),

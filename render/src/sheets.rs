@@ -4,6 +4,8 @@
 //! neighbours share a target of at most the pixels of one large view, and these are paid once. Mesa's software driver even
 //! waits for all that was drawn wherever a pass begins or ends.
 
+use umbriel_scene::{Layout, Picture, PictureKind};
+
 /// Pixels up to which views come together.
 const MOST_PIXELS: u64 = 1920 * 1080;
 
@@ -40,6 +42,20 @@ impl Sheets {
         sheet.views += 1;
         [left, 0]
     }
+}
+
+/// Do the views of a picture lie in it as they come in a sheet, and fill it?
+pub(crate) fn is_row(picture: &Picture) -> bool {
+    let Layout::Tiles(rects) = &picture.layout else { return false };
+    let [width, height] = picture.size;
+    let mut left = 0;
+    let fits = picture.views.len() == rects.len()
+        && picture.views.iter().zip(rects).all(|(view, rect)| {
+            let at = std::mem::replace(&mut left, rect.x.saturating_add(rect.width));
+            (rect.x, rect.y, [rect.width, rect.height]) == (at, 0, view.size) && rect.height == height
+        });
+    let is_small = rects.len() == 1 || u64::from(width) * u64::from(height) <= MOST_PIXELS;
+    fits && left == width && is_small && picture.kind == PictureKind::Colour
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@ use std::collections::HashSet;
 pub struct FrameStats {
     /// Views drawn, of all pictures.
     pub views: u32,
+    /// Those of them that were drawn in linear light and composed into their pictures afterwards; others were drawn in these.
+    pub composed: u32,
     /// Draw calls of surfaces and casters.
     pub draws: u32,
     /// Instances in those draws.

@@ -3,10 +3,11 @@
 use crate::author::{Authors, STANDARD};
 use crate::cache::VERTEX_BUFFERS;
 use crate::draws::{Alpha, Kind, Needs};
-use crate::gpu::{DEPTH_FORMAT, LINEAR_FORMAT};
+use crate::gpu::DEPTH_FORMAT;
 use crate::layouts::Layouts;
 use crate::lights::Lights;
 use crate::start::at_once;
+use crate::targets::Canvas;
 use crate::{shaders, uniforms};
 use std::collections::HashMap;
 use umbriel_scene::{FogKind, Material, Samples, Scene};
@@ -71,6 +72,7 @@ pub(crate) struct FrameNeeds {
     fog: u8,
     /// Lights that the surface pass adds up, and all of them; at most [`ANY_NUMBER`].
     lights: [u8; 2],
+    canvas: Canvas,
 }
 
 /// More lights than a view holds.
@@ -78,7 +80,7 @@ const ANY_NUMBER: u8 = uniforms::View::LIGHTS as u8 + 1;
 
 impl FrameNeeds {
     /// `uniforms` are of the lights that shine.
-    pub(crate) fn new(scene: &Scene, uniforms: &[uniforms::Light], lights: &Lights, maps: bool) -> FrameNeeds {
+    pub(crate) fn new(scene: &Scene, uniforms: &[uniforms::Light], lights: &Lights, maps: bool, canvas: Canvas) -> FrameNeeds {
         let number = |count: usize| count.min(usize::from(ANY_NUMBER)) as u8;
         FrameNeeds {
             maps,
@@ -91,6 +93,7 @@ impl FrameNeeds {
                 Some(FogKind::Exponential) => 2,
             },
             lights: [lights.in_surface_pass, uniforms.len()].map(number),
+            canvas,
         }
     }
 
@@ -99,7 +102,9 @@ impl FrameNeeds {
         let [in_surface_pass, all] = self.lights;
         let rest = FrameNeeds { lights: [0; 2], ..self };
         match pass {
-            Pass::Depth | Pass::Mark | Pass::Exempt if kind.alpha != Alpha::Mask => (FrameNeeds::default(), 0),
+            Pass::Depth | Pass::Mark | Pass::Exempt if kind.alpha != Alpha::Mask => {
+                (FrameNeeds { canvas: self.canvas, ..FrameNeeds::default() }, 0)
+            }
             Pass::Base | Pass::BaseInShadow => (rest, in_surface_pass),
             Pass::BaseLit => (rest, ANY_NUMBER.min(in_surface_pass + 1)),
             Pass::Blend => (rest, all),
@@ -285,6 +290,7 @@ fn pipeline(
         ("LISTS", f64::from(u8::from(frame.lists))),
         ("FOG", f64::from(frame.fog)),
         ("LIGHTS", f64::from(lights)),
+        ("IS_PICTURE", f64::from(u8::from(frame.canvas == Canvas::Picture))),
         ("HOLES", if kind.alpha == Alpha::Mask { f64::from(samples.count()) } else { 0.0 }),
     ];
     let compilation_options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
@@ -315,7 +321,7 @@ fn pipeline(
             module,
             entry_point: Some(entry),
             compilation_options,
-            targets: &[Some(wgpu::ColorTargetState { format: LINEAR_FORMAT, blend, write_mask })],
+            targets: &[Some(wgpu::ColorTargetState { format: frame.canvas.format(), blend, write_mask })],
         }),
         multiview_mask: None,
         cache: None,

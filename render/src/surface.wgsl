@@ -252,7 +252,7 @@ fn opaque(f: Fragment, @builtin(sample_mask) covered: u32) -> @location(0) vec4<
     if is_hole(s) {
         discard;
     }
-    return vec4<f32>(base(s, f.flags).rgb, 1.0);
+    return vec4<f32>(exposed(base(s, f.flags).rgb), 1.0);
 }
 
 // The same where holes are not in depth yet.
@@ -263,7 +263,7 @@ fn masked(f: Fragment, @builtin(sample_mask) covered: u32) -> Kept {
     if samples == 0u {
         discard;
     }
-    return Kept(vec4<f32>(base(s, f.flags).rgb, 1.0), samples);
+    return Kept(vec4<f32>(exposed(base(s, f.flags).rgb), 1.0), samples);
 }
 
 // Mixed over what is behind: premultiplied.

@@ -10,6 +10,25 @@ pub(crate) const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba
 /// The same bytes seen as sRGB.
 pub(crate) const PICTURE_FORMAT_SRGB: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 
+/// What the views of a frame are drawn in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) enum Canvas {
+    /// Linear light, which is composed into pictures afterwards.
+    #[default]
+    Linear,
+    /// The picture itself, which holds light as it is shown and adds nothing up.
+    Picture,
+}
+
+impl Canvas {
+    pub(crate) fn format(self) -> wgpu::TextureFormat {
+        match self {
+            Canvas::Linear => LINEAR_FORMAT,
+            Canvas::Picture => PICTURE_FORMAT_SRGB,
+        }
+    }
+}
+
 /// A finished picture.
 pub(crate) struct Target {
     pub(crate) texture: wgpu::Texture,
@@ -83,20 +102,26 @@ pub(crate) fn picture_group(device: &wgpu::Device, layout: &wgpu::BindGroupLayou
 
 /// What a sheet of views is drawn in, shared by all sheets of its size.
 pub(crate) struct ViewTarget {
-    /// Colour of every sample; none where `resolved` is drawn in itself.
-    samples: Option<wgpu::TextureView>,
-    pub(crate) resolved: wgpu::TextureView,
+    /// Made when the first sheet of its size is drawn in linear light.
+    pub(crate) linear: Option<Linear>,
     pub(crate) depth: wgpu::TextureView,
     /// A copy of `depth`, made when the first cut-out needs it.
     pub(crate) seen_depth: Option<wgpu::TextureView>,
     /// Made when the first soft shadow needs it.
     pub(crate) soft: Option<SoftTarget>,
-    /// Group 1 of the pass that reads `resolved`.
-    pub(crate) group: wgpu::BindGroup,
     last_used: u64,
 }
 
-impl ViewTarget {
+/// Linear light of a sheet.
+pub(crate) struct Linear {
+    /// Colour of every sample; none where `resolved` is drawn in itself.
+    samples: Option<wgpu::TextureView>,
+    resolved: wgpu::TextureView,
+    /// Group 1 of the pass that reads `resolved`.
+    pub(crate) group: wgpu::BindGroup,
+}
+
+impl Linear {
     /// What is drawn in.
     pub(crate) fn colour(&self) -> &wgpu::TextureView {
         self.samples.as_ref().unwrap_or(&self.resolved)
@@ -106,6 +131,14 @@ impl ViewTarget {
     pub(crate) fn resolve_target(&self) -> Option<&wgpu::TextureView> {
         self.samples.as_ref().map(|_| &self.resolved)
     }
+}
+
+/// What a sheet needs beside its depth.
+#[derive(Clone, Copy)]
+pub(crate) struct SheetNeeds {
+    pub(crate) canvas: Canvas,
+    pub(crate) is_soft: bool,
+    pub(crate) has_cutouts: bool,
 }
 
 /// What depth is copied into, to be read sample by sample.
@@ -134,45 +167,41 @@ impl ViewTargets {
         picture_layout: &wgpu::BindGroupLayout,
         size: [u32; 2],
         samples: Samples,
-        (is_soft, has_cutouts): (bool, bool),
+        needs: SheetNeeds,
         frame: u64,
     ) {
+        let view = |label, format, sample_count, usage| {
+            let texture = device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
+                view_formats: &[],
+            });
+            texture.create_view(&wgpu::TextureViewDescriptor::default())
+        };
         let target = self.0.entry(size).or_insert_with(|| {
-            let view = |label, format, sample_count, usage| {
-                let texture = device.create_texture(&wgpu::TextureDescriptor {
-                    label: Some(label),
-                    size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-                    mip_level_count: 1,
-                    sample_count,
-                    dimension: wgpu::TextureDimension::D2,
-                    format,
-                    usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                    view_formats: &[],
-                });
-                texture.create_view(&wgpu::TextureViewDescriptor::default())
-            };
-            let none = wgpu::TextureUsages::empty();
-            let resolved = view("resolved", LINEAR_FORMAT, 1, wgpu::TextureUsages::TEXTURE_BINDING);
-            ViewTarget {
-                samples: (samples != Samples::One).then(|| view("samples", LINEAR_FORMAT, samples.count(), none)),
-                group: picture_group(device, picture_layout, &resolved),
-                resolved,
-                depth: view(
-                    "depth",
-                    DEPTH_FORMAT,
-                    samples.count(),
-                    wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
-                ),
-                seen_depth: None,
-                soft: None,
-                last_used: frame,
-            }
+            let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+            let depth = view("depth", DEPTH_FORMAT, samples.count(), usage);
+            ViewTarget { linear: None, depth, seen_depth: None, soft: None, last_used: frame }
         });
         target.last_used = frame;
-        if is_soft && target.soft.is_none() {
+        if needs.canvas == Canvas::Linear && target.linear.is_none() {
+            let resolved = view("resolved", LINEAR_FORMAT, 1, wgpu::TextureUsages::TEXTURE_BINDING);
+            target.linear = Some(Linear {
+                samples: (samples != Samples::One)
+                    .then(|| view("samples", LINEAR_FORMAT, samples.count(), wgpu::TextureUsages::empty())),
+                group: picture_group(device, picture_layout, &resolved),
+                resolved,
+            });
+        }
+        if needs.is_soft && target.soft.is_none() {
             target.soft = Some(SoftTarget::new(device, target.depth.texture()));
         }
-        if has_cutouts && target.seen_depth.is_none() {
+        if needs.has_cutouts && target.seen_depth.is_none() {
             target.seen_depth = Some(copy_of(device, target.depth.texture()));
         }
     }

@@ -38,9 +38,19 @@ override LISTS: bool = true;
 override FOG: u32 = 3u;
 // How many lights a pass adds up; more than the view holds leaves it open.
 override LIGHTS: u32 = 3u;
+// What is drawn is the picture itself, not linear light that is exposed afterwards.
+override IS_PICTURE: bool = false;
 
 @group(3) @binding(0) var<uniform> frame: Frame;
 @group(3) @binding(1) var<storage, read> lights: array<Light>;
+
+// Light from the scene as it is drawn.
+fn exposed(light: vec3<f32>) -> vec3<f32> {
+    if IS_PICTURE {
+        return light * view.exposure;
+    }
+    return light;
+}
 
 // Unit vector towards the light, and its strength there (attenuation, range and cone).
 struct Incidence {

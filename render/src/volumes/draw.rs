@@ -33,7 +33,7 @@ pub(super) struct Target {
     pub(super) depth: Depth,
     pub(super) depth_stencil_format: wgpu::TextureFormat,
     pub(super) sample_count: u32,
-    pub(super) colour_format: Option<wgpu::TextureFormat>,
+    pub(super) colour_format: Colour,
 }
 
 /// Layouts of bind group 1.
@@ -80,10 +80,14 @@ pub(super) struct Drawing {
     target: Target,
     listed: (wgpu::ShaderModule, wgpu::PipelineLayout),
     quads: (wgpu::ShaderModule, wgpu::PipelineLayout),
-    counting: HashMap<Kind, wgpu::RenderPipeline>,
+    alone: (wgpu::ShaderModule, wgpu::PipelineLayout),
+    counting: HashMap<(Colour, Kind), wgpu::RenderPipeline>,
     /// Drops the counts of a group and remembers where they were not 0.
-    remember: wgpu::RenderPipeline,
+    remember: HashMap<Colour, wgpu::RenderPipeline>,
 }
+
+/// Format of the colour beside which is drawn.
+type Colour = Option<wgpu::TextureFormat>;
 
 /// What is behind or level with the visible surface fails, near caps on their own surface among it.
 fn in_front(depth: Depth) -> CompareFunction {
@@ -141,9 +145,18 @@ impl Drawing {
         let listed = program("volume draw", LISTED, &[Some(view_layout), Some(&layouts.listed)]);
         let quads = program("volume quads", QUADS, &[Some(view_layout), Some(&layouts.quads)]);
         let alone = program("volume group end", LISTED, &[]);
-        let always = (CompareFunction::Always, wgpu::DepthBiasState::default());
-        let remember = pipeline(device, &target, &alone, "whole_view", always, remembering());
-        Drawing { target, listed, quads, counting: HashMap::new(), remember }
+        let mut drawing = Drawing { target, listed, quads, alone, counting: HashMap::new(), remember: HashMap::new() };
+        drawing.set_colour(device, target.colour_format);
+        drawing
+    }
+
+    /// What is made and drawn from now on is drawn beside colour of such a format.
+    pub(super) fn set_colour(&mut self, device: &wgpu::Device, format: Colour) {
+        self.target.colour_format = format;
+        self.remember.entry(format).or_insert_with(|| {
+            let always = (CompareFunction::Always, wgpu::DepthBiasState::default());
+            pipeline(device, &self.target, &self.alone, "whole_view", always, remembering())
+        });
     }
 
     /// Makes the pipelines that `lists` may need.
@@ -152,7 +165,8 @@ impl Drawing {
             for z_fail in [false, true] {
                 for piece in Piece::ALL {
                     let kind = Kind::of(lists, piece, z_fail, grouped);
-                    if self.counting.contains_key(&kind) {
+                    let key = (self.target.colour_format, kind);
+                    if self.counting.contains_key(&key) {
                         continue;
                     }
                     let mask = if grouped { COUNT_BITS } else { 0xff };
@@ -168,7 +182,7 @@ impl Drawing {
                     let depth = self.target.depth;
                     let bias = if kind.on_surface { behind(depth) } else { Default::default() };
                     let made = pipeline(device, &self.target, program, entry, (in_front(depth), bias), stencil);
-                    self.counting.insert(kind, made);
+                    self.counting.insert(key, made);
                 }
             }
         }
@@ -188,7 +202,7 @@ impl Drawing {
             for (i, group) in groups(shown, |(l, _)| l.part.layers).enumerate() {
                 if i > 0 {
                     cut(pass, &mut scissor, whole);
-                    pass.set_pipeline(&self.remember);
+                    pass.set_pipeline(&self.remember[&self.target.colour_format]);
                     pass.draw(0..3, 0..1);
                 }
                 self.count(pass, group, true, (sight, &mut scissor));
@@ -222,7 +236,7 @@ impl Drawing {
         let (mut kind, mut bound) = (None, None);
         for (wanted, place, piece) in pieces {
             let (lists, choice) = &shown[place];
-            let Some(pipeline) = self.counting.get(&wanted) else { continue };
+            let Some(pipeline) = self.counting.get(&(self.target.colour_format, wanted)) else { continue };
             if kind.replace(wanted) != Some(wanted) {
                 pass.set_pipeline(pipeline);
             }

@@ -190,6 +190,11 @@ impl VolumePass {
         }
     }
 
+    /// The passes that are drawn in from now on have a colour attachment of this format, or none.
+    pub fn set_colour_format(&mut self, device: &wgpu::Device, colour_format: Option<wgpu::TextureFormat>) {
+        self.drawing.set_colour(device, colour_format);
+    }
+
     /// Makes the lists of every job, in the encoder of the passes that draw them and before these; jobs are then drawn by
     /// their place in `jobs`.
     pub fn prepare(&mut self, device: &wgpu::Device, encoder: &mut wgpu::CommandEncoder, jobs: &[VolumeJob]) -> VolumeStats {

@@ -87,3 +87,54 @@ fn a_view_may_be_off_axis_and_anywhere() {
     let view = look("far off", eye, eye - Vec3::Y, [32, 32]);
     assert_colour(shoot(&moved, &Picture::mono(view)).centre(), [0.75, 0.25, 0.5], "ten kilometres up");
 }
+
+/// What is drawn straight in its picture, and what for this or that reason is not, looks the same to the last bit but one.
+#[test]
+fn pictures_drawn_in_themselves_are_as_if_composed() {
+    let box_at = |x: f32| shape(cuboid(Vec3::ONE), matt(0.8, 0.5, 0.3), at(x, 0.5, 0.0));
+    let drawables = vec![shape(plane(40.0), matt(0.6, 0.6, 0.6), at(0.0, 0.0, 0.0)), box_at(-1.5), box_at(1.5)];
+    let sun = |shadows| Light { direction: Vec3::new(-0.5, -1.0, -0.4).normalize(), shadows, ..noon() };
+    let lamp = |shadows| Light { kind: LightKind::Point, position: Vec3::new(0.0, 3.0, 1.0), shadows, ..noon() };
+    let scene = |lights: &[Light]| Scene {
+        drawables: drawables.clone().into(),
+        lights: lights.to_vec(),
+        samples: Samples::One,
+        exposure: 1.7,
+        background: Background { horizon: Vec3::new(0.4, 0.5, 0.6), ..Default::default() },
+        ..Default::default()
+    };
+    let (volume, map) = (ShadowMethod::Volume, ShadowMethod::Map);
+    let view = |x: f32, width| look("row", Vec3::new(x, 2.0, 6.0), Vec3::new(x, 0.5, 0.0), [width, 48]);
+    let rect = |x, width| Rect { x, y: 0, width, height: 48 };
+    let row = |rects: [Rect; 2]| {
+        let views = [view(-1.0, rects[0].width), view(1.0, rects[1].width)];
+        picture(views, [112, 48], Layout::Tiles(rects.into()))
+    };
+    let in_order = row([rect(0, 64), rect(64, 48)]);
+    let behind_the_eye = shape(plane(1.0), Material { alpha: AlphaMode::Blend, ..matt(1.0, 1.0, 1.0) }, at(0.0, 1.0, 30.0));
+    let rows = [
+        ("no light", vec![], &in_order, 0),
+        ("a sun by volume", vec![sun(volume)], &in_order, 0),
+        ("a sun by map, a lamp by volume", vec![sun(map), lamp(volume)], &in_order, 0),
+        ("two lights by volume add up", vec![sun(volume), lamp(volume)], &in_order, 2),
+        ("views that do not lie in a row", vec![sun(volume)], &row([rect(48, 64), rect(0, 48)]), 2),
+        ("views with a gap", vec![sun(volume)], &row([rect(0, 32), rect(64, 48)]), 2),
+    ];
+    for (name, lights, picture, composed) in rows {
+        let mut scene = scene(&lights);
+        let shot = shoot(&scene, picture);
+        assert_eq!((shot.stats.composed, shot.problems), (composed, Vec::new()), "{name}");
+        scene.drawables = scene.drawables.iter().cloned().chain([behind_the_eye.clone()]).collect::<Vec<_>>().into();
+        let with_glass = shoot(&scene, picture);
+        assert_eq!(with_glass.stats.composed, 2, "{name}, with something half-transparent");
+        let worst = shot.layers[0].rgba.iter().zip(&with_glass.layers[0].rgba).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(worst <= Some(1), "{name}: {worst:?}");
+        assert!(shot.layers[0].rgba.iter().any(|v| *v > 100), "{name}: black");
+    }
+    let (scene, four) = (scene(&[sun(volume)]), Samples::Four);
+    assert_eq!(
+        shoot(&Scene { samples: four, ..scene }, &in_order).stats.composed,
+        2,
+        "samples are mixed before they are exposed"
+    );
+}
