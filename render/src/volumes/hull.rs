@@ -5,7 +5,7 @@ use umbriel_scene::Aabb;
 
 /// Is there a gap of more than `margin` metres between the hulls of `a` and of `b` across one of `axes`?
 ///
-/// Points have w = 1; directions, towards which a hull goes on without end, have w = 0. Two convex polytopes are apart
+/// Points have w = 1; directions, towards which a hull goes on without end, have w = 0; of one of the hulls at most. Two convex polytopes are apart
 /// exactly if they are so across a normal of one of their faces or a product of one edge of each (Gottschalk 1996); with
 /// fewer axes the answer is still never a wrong yes.
 pub(super) fn are_apart(a: &[DVec4], b: &[DVec4], axes: impl IntoIterator<Item = DVec3>, margin: f64) -> bool {
@@ -23,12 +23,12 @@ pub(super) fn extent(points: &[DVec4], axis: DVec3) -> (f64, f64) {
         if p.w != 0.0 {
             (low, high) = (low.min(x), high.max(x));
         } else {
-            // A direction within rounding of the axis' own plane may go either way.
-            let slack = 1e-9 * p.truncate().length();
-            if x > -slack {
+            // What runs along the axis' own plane stays where it is. Rounding takes it out of the plane by 1e-9 of its way at most,
+            // and as far as the other hull goes, margins hold a thousand times that.
+            let along = 1e-9 * p.truncate().length();
+            if x > along {
                 high = f64::INFINITY;
-            }
-            if x < slack {
+            } else if x < -along {
                 low = f64::NEG_INFINITY;
             }
         }
@@ -59,4 +59,31 @@ pub(super) fn planes(b: &Aabb) -> [DVec4; 6] {
 pub(super) fn margin(points: &[DVec4]) -> f64 {
     let largest = points.iter().map(|p| p.truncate().abs().max_element() * p.w).fold(0.0, f64::max);
     1e-5 * largest + 1e-6
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    /// A window of 20 cm at the origin, and all of the way from it to a sun.
+    #[test]
+    fn what_goes_on_without_end_passes_beside_boxes() {
+        let towards = DVec3::new(0.55, 0.62, 0.45);
+        let window = [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)].map(|(x, y)| DVec4::new(x, y, -0.1, 1.0));
+        let beam: Vec<DVec4> = window.into_iter().chain([towards.extend(0.0)]).collect();
+        let axes = || DVec3::AXES.into_iter().chain(DVec3::AXES.map(|edge| towards.cross(edge)));
+        let is_apart = |centre: DVec3, half: f64| {
+            let (centre, half) = (centre.as_vec3(), Vec3::splat(half as f32));
+            are_apart(&beam, &corners(&Aabb { min: centre - half, max: centre + half }), axes(), 1e-3)
+        };
+        for way in [1.0, 10.0, 1000.0] {
+            let on_it = towards * way;
+            assert!(!is_apart(on_it, 0.5), "on it, at {way}");
+            for side in [DVec3::X, DVec3::NEG_Y, DVec3::new(1.0, -1.0, 1.0)] {
+                assert!(is_apart(on_it + 2.0 * side, 0.5), "beside it by {side}, at {way}");
+            }
+            assert!(is_apart(-on_it, 0.5), "on the other side of the window, at {way}");
+        }
+    }
 }
