@@ -153,7 +153,7 @@ impl Renderer {
         let limit = self.gpu.device.limits().max_texture_dimension_2d;
         let is_mixed = !contours.is_empty() || self.draws.batches().iter().any(|batch| adds_light(batch.kind));
         let canvas = if is_mixed { Canvas::Linear } else { plan::canvas(scene.samples, all, &jobs, &soft, limit) };
-        self.volumes.set_colour_format(&self.gpu.device, Some(canvas.format()));
+        self.volumes.set_colour_format(Some(canvas.format()));
         self.screen.make_background(&self.gpu.device, canvas);
         let shone = &light_uniforms[..lights.order.len()];
         self.surface.set_frame(FrameNeeds::new(scene, shone, &lights, !self.maps.faces.is_empty(), canvas));

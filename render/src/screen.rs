@@ -85,14 +85,13 @@ impl Screen {
     /// Makes what [`Screen::background`] gives.
     pub(crate) fn make_background(&mut self, device: &wgpu::Device, canvas: Canvas) {
         self.backgrounds.entry(canvas).or_insert_with(|| {
-            let constants = [("IS_PICTURE", f64::from(u8::from(canvas == Canvas::Picture)))];
             pipeline(
                 device,
                 (&self.background_layout, &shaders::module(device, "background", &[&shaders::background()])),
                 ["sky", "background"],
                 (canvas.format(), None, ColorWrites::ALL),
                 Some((self.samples, CompareFunction::Equal, wgpu::StencilState::default())),
-                &constants,
+                &[canvas.constant()],
             )
         });
     }

@@ -290,7 +290,7 @@ fn pipeline(
         ("LISTS", f64::from(u8::from(frame.lists))),
         ("FOG", f64::from(frame.fog)),
         ("LIGHTS", f64::from(lights)),
-        ("IS_PICTURE", f64::from(u8::from(frame.canvas == Canvas::Picture))),
+        frame.canvas.constant(),
         ("HOLES", if kind.alpha == Alpha::Mask { f64::from(samples.count()) } else { 0.0 }),
     ];
     let compilation_options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };

@@ -27,6 +27,11 @@ impl Canvas {
             Canvas::Picture => PICTURE_FORMAT_SRGB,
         }
     }
+
+    /// The constant of shaders/light.wgsl that says it.
+    pub(crate) fn constant(self) -> (&'static str, f64) {
+        ("IS_PICTURE", f64::from(u8::from(self == Canvas::Picture)))
+    }
 }
 
 /// A finished picture.

@@ -145,22 +145,20 @@ impl Drawing {
         let listed = program("volume draw", LISTED, &[Some(view_layout), Some(&layouts.listed)]);
         let quads = program("volume quads", QUADS, &[Some(view_layout), Some(&layouts.quads)]);
         let alone = program("volume group end", LISTED, &[]);
-        let mut drawing = Drawing { target, listed, quads, alone, counting: HashMap::new(), remember: HashMap::new() };
-        drawing.set_colour(device, target.colour_format);
-        drawing
+        Drawing { target, listed, quads, alone, counting: HashMap::new(), remember: HashMap::new() }
     }
 
     /// What is made and drawn from now on is drawn beside colour of such a format.
-    pub(super) fn set_colour(&mut self, device: &wgpu::Device, format: Colour) {
+    pub(super) fn set_colour(&mut self, format: Colour) {
         self.target.colour_format = format;
-        self.remember.entry(format).or_insert_with(|| {
-            let always = (CompareFunction::Always, wgpu::DepthBiasState::default());
-            pipeline(device, &self.target, &self.alone, "whole_view", always, remembering())
-        });
     }
 
     /// Makes the pipelines that `lists` may need.
     pub(super) fn make(&mut self, device: &wgpu::Device, lists: &Lists) {
+        self.remember.entry(self.target.colour_format).or_insert_with(|| {
+            let always = (CompareFunction::Always, wgpu::DepthBiasState::default());
+            pipeline(device, &self.target, &self.alone, "whole_view", always, remembering())
+        });
         for grouped in [false, true] {
             for z_fail in [false, true] {
                 for piece in Piece::ALL {

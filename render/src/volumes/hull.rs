@@ -5,9 +5,9 @@ use umbriel_scene::Aabb;
 
 /// Is there a gap of more than `margin` metres between the hulls of `a` and of `b` across one of `axes`?
 ///
-/// Points have w = 1; directions, towards which a hull goes on without end, have w = 0; of one of the hulls at most. Two convex polytopes are apart
-/// exactly if they are so across a normal of one of their faces or a product of one edge of each (Gottschalk 1996); with
-/// fewer axes the answer is still never a wrong yes.
+/// Points have w = 1; directions, towards which a hull goes on without end, have w = 0, and one of the hulls at most has some.
+/// Two convex polytopes are apart exactly if they are so across a normal of one of their faces or a product of one edge of each
+/// (Gottschalk 1996); with fewer axes the answer is still never a wrong yes.
 pub(super) fn are_apart(a: &[DVec4], b: &[DVec4], axes: impl IntoIterator<Item = DVec3>, margin: f64) -> bool {
     axes.into_iter().filter_map(DVec3::try_normalize).any(|axis| {
         let (a, b) = (extent(a, axis), extent(b, axis));

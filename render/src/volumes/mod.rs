@@ -191,8 +191,8 @@ impl VolumePass {
     }
 
     /// The passes that are drawn in from now on have a colour attachment of this format, or none.
-    pub fn set_colour_format(&mut self, device: &wgpu::Device, colour_format: Option<wgpu::TextureFormat>) {
-        self.drawing.set_colour(device, colour_format);
+    pub fn set_colour_format(&mut self, colour_format: Option<wgpu::TextureFormat>) {
+        self.drawing.set_colour(colour_format);
     }
 
     /// Makes the lists of every job, in the encoder of the passes that draw them and before these; jobs are then drawn by
