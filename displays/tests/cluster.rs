@@ -128,6 +128,44 @@ fn follow(follower: &mut Follower, seen: &mut Seen, mut done: impl FnMut(&mut Se
 }
 
 #[test]
+fn displays_join_an_application_that_is_too_slow_for_its_frame_rate() {
+    let endpoint = format!("tcp/127.0.0.1:{}", free_port());
+    let end = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let (graph, late) = (new_graph(), Instant::now());
+        let mut host = Host::listen(&host_options(&endpoint)).unwrap();
+        let end = &end;
+        scope.spawn(move || {
+            while !end.load(Ordering::Relaxed) {
+                host.frame(&graph, false);
+                host.wait_until(&graph, late);
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        });
+        let mut follower = join(&endpoint, Security::Loopback, "left").unwrap();
+        let started = Instant::now();
+        while follower.replica().is_none() && started.elapsed() < Duration::from_secs(20) {
+            follower.run(&mut Blind, Duration::from_millis(10)).unwrap();
+        }
+        end.store(true, Ordering::Relaxed);
+        assert!(follower.replica().is_some());
+    });
+}
+
+/// Draws nothing.
+struct Blind;
+
+impl Screen for Blind {
+    type Error = ClusterError;
+    fn draw(&mut self, _graph: &Graph, _frame: u64, _is_new: bool) -> Result<(), ClusterError> {
+        Ok(())
+    }
+    fn show(&mut self, _frame: u64) -> Result<(), ClusterError> {
+        Ok(())
+    }
+}
+
+#[test]
 fn displays_follow_come_late_and_outlive_the_application() {
     let endpoint = format!("tcp/127.0.0.1:{}", free_port());
     let (first_end, second_end) = (AtomicBool::new(false), AtomicBool::new(false));

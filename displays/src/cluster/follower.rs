@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use umbriel_fields::replica::{Replica, ReplicaError};
+use umbriel_fields::replica::{Packet, Replica, ReplicaError};
 use umbriel_fields::{Graph, TypeRegistry};
 use zenoh::Wait;
 use zenoh::pubsub::Publisher as ZenohPublisher;
@@ -11,12 +11,13 @@ use zenoh::qos::{CongestionControl, Priority};
 
 use super::cache::{Cache, CacheOptions};
 use super::event::Event;
-use super::line::{Answer, Line, Link};
+use super::line::{Answer, Kinds, Line, Link};
 use super::lock::{DisplayAction, DisplayEvent, DisplayLock};
 use super::message::{
     DISPLAY, INPUT, Join, PROTOCOL, READY, RELEASE, Ready, Release, SNAPSHOT, Told, bytes_of, message_of, stamped_packet,
 };
 use super::ordered::Outbox;
+use super::queue::Flood;
 use super::transport::{ClusterError, End, Security, network};
 use super::world::World;
 
@@ -85,6 +86,7 @@ fn note(when: &mut Option<Instant>) {
 
 enum Arrived {
     Frame(Vec<u8>),
+    Flood(Flood),
     Release(Vec<u8>),
     Snapshot(Answer),
     Bulk(u64, Answer),
@@ -148,10 +150,15 @@ impl Follower {
     /// be drawn.
     pub fn connect(options: FollowerOptions, name: &str, types: impl Into<TypeRegistry>) -> Result<Follower, ClusterError> {
         let FollowerOptions { endpoint, security, lease, ends_with_application, uses_memory, cache } = options;
-        let subject = (RELEASE, Arrived::Release as fn(Vec<u8>) -> Arrived);
+        let kinds = Kinds {
+            frame: Arrived::Frame,
+            flood: Arrived::Flood,
+            subject: (RELEASE, Arrived::Release),
+            application: Arrived::Application,
+        };
         let cache = cache.map(Cache::open);
         let link = Link { end: End::Display, endpoint: &endpoint, security: &security, lease, uses_memory, cache };
-        let mut line = Line::open(link, Arrived::Frame, subject, Arrived::Application)?;
+        let mut line = Line::open(link, kinds)?;
         let declare = |key: &'static str| {
             let publisher = line.session.declare_publisher(key).congestion_control(CongestionControl::Drop);
             publisher.priority(Priority::RealTime).express(true).wait().map_err(network)
@@ -267,24 +274,19 @@ impl Follower {
 
     fn handle<S: Screen>(&mut self, arrived: Arrived, screen: &mut S) -> Result<(), S::Error> {
         match arrived {
-            Arrived::Frame(bytes) => match stamped_packet(bytes) {
-                Ok((epoch, packet)) => {
-                    let (frame, missing) = (packet.frame(), packet.missing(&self.world.bulk));
-                    if epoch > self.lock.epoch() {
-                        self.world.packets.clear();
-                        self.parked.clear();
-                        self.step(DisplayEvent::Release { epoch, frame: 0, is_mine: false }, screen)?;
-                    }
-                    self.line.ask_for_bulk(missing, Arrived::Bulk);
-                    // What comes again is here already.
-                    if epoch == self.lock.epoch() && self.world.replica.as_ref().is_none_or(|replica| frame > replica.frame()) {
-                        self.world.packets.insert(frame, packet);
-                        self.parked.push_back(Parked::Frame(epoch, frame));
-                    }
+            Arrived::Frame(bytes) => {
+                let length = bytes.len();
+                match stamped_packet(bytes) {
+                    Ok((epoch, packet)) => self.framed(epoch, packet, length, screen)?,
+                    // What is damaged is a gap: a snapshot closes it.
+                    Err(error) => self.world.complain("a frame", &error.into()),
                 }
-                // What is damaged is a gap: a snapshot closes it.
-                Err(error) => self.world.complain("a frame", &error.into()),
-            },
+            }
+            Arrived::Flood(flood) => {
+                self.world.flooded(flood);
+                self.parked.retain(|parked| matches!(parked, Parked::Snapshot(..)));
+                self.step(DisplayEvent::Flooded, screen)?;
+            }
             Arrived::Release(bytes) => match message_of::<Release>(&bytes) {
                 Ok(release) => {
                     let is_mine = release.may_show.contains(&self.line.id);
@@ -341,6 +343,28 @@ impl Follower {
         self.unpark(screen)
     }
 
+    /// A packet of so many bytes came.
+    fn framed<S: Screen>(&mut self, epoch: u64, packet: Packet<'static>, bytes: usize, screen: &mut S) -> Result<(), S::Error> {
+        let (frame, missing) = (packet.frame(), packet.missing(&self.world.bulk));
+        if epoch > self.lock.epoch() {
+            self.world.packets.clear();
+            self.parked.clear();
+            self.step(DisplayEvent::Release { epoch, frame: 0, is_mine: false }, screen)?;
+        }
+        self.line.ask_for_bulk(missing, Arrived::Bulk);
+        if epoch != self.lock.epoch() {
+            return Ok(());
+        }
+        if self.world.replica.as_ref().is_none_or(|replica| frame > replica.frame()) {
+            self.world.keep(packet, bytes);
+            self.parked.push_back(Parked::Frame(epoch, frame));
+        } else if self.lock.follows() {
+            // It is here already, unless what is here is none of this run.
+            self.step(DisplayEvent::Frame { epoch, frame }, screen)?;
+        }
+        Ok(())
+    }
+
     /// The application answers who asked for everything.
     fn answered(&mut self, answer: Answer) -> Result<(), ClusterError> {
         self.can_ask = true;
@@ -380,7 +404,7 @@ impl Follower {
     fn unpark<S: Screen>(&mut self, screen: &mut S) -> Result<(), S::Error> {
         while let Some(parked) = self.parked.front() {
             let packet = match parked {
-                Parked::Frame(_, frame) => self.world.packets.get(frame),
+                Parked::Frame(_, frame) => self.world.packets.get(*frame),
                 Parked::Snapshot(..) => self.world.snapshot.as_ref(),
             };
             if packet.is_some_and(|packet| !packet.missing(&self.world.bulk).is_empty()) {
@@ -417,7 +441,7 @@ impl Follower {
                                 events.push_back(DisplayEvent::Unusable);
                             }
                         }
-                        self.world.packets = self.world.packets.split_off(&frame.saturating_add(1));
+                        self.world.packets.forget_to(frame);
                     }
                     DisplayAction::Apply(frame) => events.push_back(self.apply(frame)),
                     DisplayAction::Draw(frame) => {

@@ -1,21 +1,23 @@
 //! The link to the application, as displays and guests hold it: what comes in stands in one queue.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use crossbeam::channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
+use crossbeam::channel::{TryRecvError, bounded};
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
+use super::backlog::MOST_BYTES;
 use super::cache::Cache;
 use super::frames::{Frames, Memory};
 use super::lines::number_of_process;
 use super::message::{APPLICATION, BULK};
 use super::near::{Bell, Word};
+use super::queue::{Flood, Queue};
 use super::short::Short;
 use super::transport::{ClusterError, End, Security, network, open, port_of};
 
@@ -28,8 +30,17 @@ const LOOK: Duration = Duration::from_millis(50);
 /// An answer, or why there is none.
 pub(super) type Answer = Result<Vec<u8>, String>;
 
-/// A subject, and what its messages arrive as.
-pub(super) type Subject<A> = (&'static str, fn(Vec<u8>) -> A);
+/// What the application's messages arrive as.
+#[derive(Clone, Copy)]
+pub(super) struct Kinds<A> {
+    pub(super) frame: fn(Vec<u8>) -> A,
+    /// Frames were dropped.
+    pub(super) flood: fn(Flood) -> A,
+    /// What else it publishes.
+    pub(super) subject: (&'static str, fn(Vec<u8>) -> A),
+    /// It came or went.
+    pub(super) application: fn(bool) -> A,
+}
 
 /// What a line is made of.
 pub(super) struct Link<'a> {
@@ -44,21 +55,47 @@ pub(super) struct Link<'a> {
 }
 
 /// Where things arrive; rings for who waits at the short line.
-struct Post<A> {
-    sender: Sender<A>,
-    bell: Arc<Bell>,
-}
+struct Post<A>(Arc<(Mutex<Queue<A>>, Condvar, Bell)>);
 
 impl<A> Clone for Post<A> {
     fn clone(&self) -> Post<A> {
-        Post { sender: self.sender.clone(), bell: self.bell.clone() }
+        Post(self.0.clone())
     }
 }
 
 impl<A> Post<A> {
+    fn new(flood: fn(Flood) -> A) -> Post<A> {
+        Post(Arc::new((Mutex::new(Queue::new(MOST_BYTES, flood)), Condvar::new(), Bell::new())))
+    }
+
+    fn enter(&self) -> MutexGuard<'_, Queue<A>> {
+        self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn send(&self, arrived: A) {
-        let _ = self.sender.send(arrived);
-        self.bell.ring();
+        self.enter().push(arrived);
+        self.ring();
+    }
+
+    fn send_frame(&self, bytes: Vec<u8>, kind: fn(Vec<u8>) -> A) {
+        let length = bytes.len();
+        self.enter().push_frame(kind(bytes), length);
+        self.ring();
+    }
+
+    fn ring(&self) {
+        self.0.1.notify_one();
+        self.bell().ring();
+    }
+
+    fn bell(&self) -> &Bell {
+        &self.0.2
+    }
+
+    /// What comes next within some time.
+    fn wait(&self, patience: Duration) -> Option<A> {
+        let waited = self.0.1.wait_timeout_while(self.enter(), patience, |queue| queue.is_empty());
+        waited.unwrap_or_else(PoisonError::into_inner).0.pop()
     }
 }
 
@@ -90,7 +127,7 @@ impl<A> Ear<'_, A> {
     /// Takes what comes within some time; false at once where there is no short line.
     fn hear(&mut self, patience: Duration) -> bool {
         let Ear { short, memory, post, kind } = self;
-        short.wait(&post.bell, patience, |word, message| match (word, *memory) {
+        short.wait(post.bell(), patience, |word, message| match (word, *memory) {
             (Word::Here, Some(memory)) => memory.read(message),
             (Word::Release, _) => post.send(kind(message.to_vec())),
             _ => {}
@@ -103,7 +140,6 @@ pub(super) struct Line<A> {
     pub(super) session: Session,
     /// Of this process, unlike any other's.
     pub(super) id: u64,
-    arrived: Receiver<A>,
     post: Post<A>,
     /// Long values that were asked for and have not come.
     asked: BTreeSet<u64>,
@@ -111,7 +147,7 @@ pub(super) struct Line<A> {
     /// Bytes of long values that were fetched, and of those that were here.
     pub(super) fetched: [u64; 2],
     frames: Frames,
-    subject: Subject<A>,
+    kinds: Kinds<A>,
     /// Told of the subject, unless it is the short line that tells.
     over_network: Option<Subscriber<()>>,
     short: Short,
@@ -120,41 +156,25 @@ pub(super) struct Line<A> {
 }
 
 impl<A: Send + 'static> Line<A> {
-    /// Links to an application, now or as soon as it is there. `frame` and `subject` are what it publishes, `application` tells that it came
-    /// or went.
+    /// Links to an application, now or as soon as it is there.
     pub(super) fn open(
         Link { end, endpoint, security, lease, uses_memory, cache }: Link<'_>,
-        frame: fn(Vec<u8>) -> A,
-        subject: Subject<A>,
-        application: fn(bool) -> A,
+        kinds: Kinds<A>,
     ) -> Result<Line<A>, ClusterError> {
         let session = open(endpoint, security, end, lease)?;
         let id = number_of_process(&session.zid().to_string()).unwrap_or_default();
-        let (sender, arrived) = unbounded();
-        let post = Post { sender, bell: Arc::new(Bell::new()) };
+        let Kinds { frame, flood, application, .. } = kinds;
+        let post = Post::new(flood);
         let framed = post.clone();
-        let frames = Frames::follow(&session, uses_memory, move |bytes| framed.send(frame(bytes)))?;
+        let frames = Frames::follow(&session, uses_memory, move |bytes| framed.send_frame(bytes, frame))?;
         let told = post.clone();
         let alive = session.liveliness().declare_subscriber(APPLICATION).history(true);
         let alive = alive.callback(move |sample| told.send(application(sample.kind() == SampleKind::Put)));
         let _alive = alive.wait().map_err(network)?;
         let short = Short::at(port_of(endpoint).filter(|_| end == End::Display && uses_memory));
         let (asked, over_network) = (BTreeSet::new(), None);
-        let mut line = Line {
-            session,
-            id,
-            arrived,
-            post,
-            asked,
-            cache,
-            fetched: [0; 2],
-            frames,
-            subject,
-            over_network,
-            short,
-            _token: None,
-            _alive,
-        };
+        let mut line =
+            Line { session, id, post, asked, cache, fetched: [0; 2], frames, kinds, over_network, short, _token: None, _alive };
         line.follow()?;
         Ok(line)
     }
@@ -175,7 +195,7 @@ impl<A: Send + 'static> Line<A> {
         if is_told {
             self.over_network = None;
         } else if self.over_network.is_none() {
-            let ((key, kind), post) = (self.subject, self.post.clone());
+            let ((key, kind), post) = (self.kinds.subject, self.post.clone());
             let take = move |sample: Sample| post.send(kind(sample.payload().to_bytes().into_owned()));
             self.over_network = Some(self.session.declare_subscriber(key).callback(take).wait().map_err(network)?);
         }
@@ -184,17 +204,17 @@ impl<A: Send + 'static> Line<A> {
 
     /// What arrives next within some time.
     pub(super) fn next(&mut self, patience: Duration) -> Option<A> {
-        let arrived = self.arrived.try_recv().ok();
+        let arrived = self.post.enter().pop();
         if arrived.is_some() || patience.is_zero() {
             return arrived;
         }
         let waited = self.ear().hear(patience);
-        if waited { self.arrived.try_recv().ok() } else { self.arrived.recv_timeout(patience).ok() }
+        if waited { self.post.enter().pop() } else { self.post.wait(patience) }
     }
 
     fn ear(&mut self) -> Ear<'_, A> {
         let memory = self.frames.memory().map(|(memory, _)| memory);
-        Ear { short: &mut self.short, memory, post: &self.post, kind: self.subject.1 }
+        Ear { short: &mut self.short, memory, post: &self.post, kind: self.kinds.subject.1 }
     }
 
     /// Does what may take long, and takes meanwhile what comes down the short line: neither that nor the application's memory holds much.
@@ -206,15 +226,15 @@ impl<A: Send + 'static> Line<A> {
             scope.spawn(move || while is_done.try_recv() == Err(TryRecvError::Empty) && ear.hear(LOOK) {});
             let done = work();
             drop(at_work);
-            post.bell.ring();
+            post.bell().ring();
             done
         })
     }
 
     /// What the application said last down the short line of the subject; that it went may be known sooner.
     pub(super) fn last_words(&mut self) -> Vec<A> {
-        let (mut words, kind) = (Vec::new(), self.subject.1);
-        self.short.drain(&self.post.bell, |word, message| {
+        let (mut words, kind) = (Vec::new(), self.kinds.subject.1);
+        self.short.drain(self.post.bell(), |word, message| {
             if word == Word::Release {
                 words.push(kind(message.to_vec()));
             }

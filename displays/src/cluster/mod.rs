@@ -8,6 +8,8 @@ pub mod guests;
 pub mod lock;
 
 #[cfg(feature = "cluster")]
+mod backlog;
+#[cfg(feature = "cluster")]
 mod cache;
 #[cfg(feature = "cluster")]
 mod certificates;
@@ -39,6 +41,8 @@ mod ordered;
 mod outlets;
 #[cfg(feature = "cluster")]
 mod proxy;
+#[cfg(any(feature = "cluster", test))]
+mod queue;
 #[cfg(feature = "cluster")]
 mod quiet;
 #[cfg(feature = "cluster")]

@@ -1,16 +1,17 @@
 //! What an application tells all: frames and releases.
 
-use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
+use super::backlog::MOST_BYTES;
 use super::memory::{Shelf, Whereabouts};
 use super::message::{FRAME, HERE, RELEASE, Release, bytes_of};
 use super::near::Word;
 use super::neighbours::Neighbours;
+use super::queue::{Flood, Queue};
 use super::transport::{ClusterError, network};
 
 /// Where frames and releases go out. All may be dropped: a gap is repaired by a snapshot.
@@ -23,7 +24,7 @@ pub(super) struct Outlets {
     /// Who hears of both down a short line.
     pub(super) neighbours: Neighbours,
     /// What is still to go over the network, in order.
-    queue: Mutex<VecDeque<Far>>,
+    queue: Mutex<Queue<Far>>,
     /// Held by who sends it.
     sending: Mutex<()>,
 }
@@ -33,6 +34,8 @@ enum Far {
     Here(u64, Vec<u8>),
     Frame(u64, Vec<u8>),
     Release(u64, Vec<u8>),
+    /// Frames that were not sent in time.
+    Dropped(Flood),
 }
 
 /// A packet that is ready to go: itself, where somebody wants it over the network, and where it lies.
@@ -81,12 +84,12 @@ impl Outlets {
             here: declare(HERE, Priority::RealTime)?,
             releases: declare(RELEASE, Priority::RealTime)?,
             neighbours: Neighbours::default(),
-            queue: Mutex::default(),
+            queue: Mutex::new(Queue::new(MOST_BYTES, Far::Dropped)),
             sending: Mutex::default(),
         })
     }
 
-    fn queue(&self) -> MutexGuard<'_, VecDeque<Far>> {
+    fn queue(&self) -> MutexGuard<'_, Queue<Far>> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -96,10 +99,11 @@ impl Outlets {
         if let Some(whereabouts) = &parcel.whereabouts {
             let bytes = bytes_of(whereabouts);
             self.neighbours.tell(Word::Here, &bytes);
-            queue.push_back(Far::Here(frame, bytes));
+            queue.push(Far::Here(frame, bytes));
         }
         if !parcel.packet.is_empty() {
-            queue.push_back(Far::Frame(frame, parcel.packet));
+            let length = parcel.packet.len();
+            queue.push_frame(Far::Frame(frame, parcel.packet), length);
         }
     }
 
@@ -107,7 +111,7 @@ impl Outlets {
     pub(super) fn release(&self, release: &Release) {
         let bytes = bytes_of(release);
         self.neighbours.tell(Word::Release, &bytes);
-        self.queue().push_back(Far::Release(release.frame, bytes));
+        self.queue().push(Far::Release(release.frame, bytes));
     }
 
     /// Sends what is to go over the network, which may take a while on a busy machine. Where another thread does that already, it sends all.
@@ -117,11 +121,14 @@ impl Outlets {
         {
             loop {
                 // Not held while it is sent.
-                let next = self.queue().pop_front();
+                let next = self.queue().pop();
                 match next {
                     Some(Far::Here(frame, bytes)) => warn(self.here.put(bytes).wait(), "frame", frame),
                     Some(Far::Frame(frame, bytes)) => warn(self.frames.put(bytes).wait(), "frame", frame),
                     Some(Far::Release(frame, bytes)) => warn(self.releases.put(bytes).wait(), "release of frame", frame),
+                    Some(Far::Dropped(flood)) => {
+                        tracing::warn!("a line is too slow: {flood} were not sent, and displays that lack them fetch the world");
+                    }
                     None => break,
                 }
             }

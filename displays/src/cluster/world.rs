@@ -1,10 +1,10 @@
 //! The world at a display: the replica, packets that wait for their turn, and what is said of those that cannot be used.
 
-use std::collections::BTreeMap;
-
 use umbriel_fields::TypeRegistry;
 use umbriel_fields::replica::{Bulk, Packet, Replica};
 
+use super::backlog::{Backlog, MOST_BYTES};
+use super::queue::Flood;
 use super::quiet::{Quiet, Words};
 use super::transport::ClusterError;
 
@@ -14,7 +14,7 @@ pub(super) struct World {
     endpoint: String,
     types: TypeRegistry,
     pub(super) bulk: Bulk,
-    pub(super) packets: BTreeMap<u64, Packet<'static>>,
+    pub(super) packets: Backlog<Packet<'static>>,
     pub(super) snapshot: Option<Packet<'static>>,
     pub(super) replica: Option<Replica>,
     /// One that differs from the application, until it is known where.
@@ -31,7 +31,7 @@ impl World {
             endpoint,
             types,
             bulk: Bulk::new(),
-            packets: BTreeMap::new(),
+            packets: Backlog::new(MOST_BYTES),
             snapshot: None,
             replica: None,
             doubted: None,
@@ -48,6 +48,19 @@ impl World {
             .map_or_else(|| "there is no world here yet".into(), |replica| format!("the last frame here is {}", replica.frame()));
         let words = format!("{what} from {} cannot be used: {error}; {frame}", self.endpoint);
         self.quiet.say(Words::Error(words));
+    }
+
+    /// Keeps a packet of so many bytes until it is its turn.
+    pub(super) fn keep(&mut self, packet: Packet<'static>, bytes: usize) {
+        if !self.packets.keep(packet.frame(), packet, bytes) {
+            let words = format!("the world of {} takes long to come: frames that wait for it are dropped", self.endpoint);
+            self.quiet.say(Words::Warn(words));
+        }
+    }
+
+    /// Frames were dropped before anybody looked at them.
+    pub(super) fn flooded(&mut self, flood: Flood) {
+        tracing::warn!("{flood} came from {} while this display was busy, and are dropped: it fetches the world", self.endpoint);
     }
 
     fn tell_unknown(&mut self, types: Vec<String>) {
@@ -77,7 +90,7 @@ impl World {
 
     /// Applies a packet that waits. Gives whether the replica agrees with the application then, and the packet's memory.
     pub(super) fn apply(&mut self, frame: u64) -> (bool, Vec<u8>) {
-        let (Some(packet), Some(replica)) = (self.packets.remove(&frame), &mut self.replica) else {
+        let (Some(packet), Some(replica)) = (self.packets.take(frame), &mut self.replica) else {
             return (false, Vec::new());
         };
         let applied = replica.apply(&packet, &self.bulk);

@@ -10,12 +10,14 @@ use zenoh::Wait;
 use zenoh::pubsub::Publisher as ZenohPublisher;
 use zenoh::qos::CongestionControl;
 
-use crate::cluster::line::{Answer, Line, Link};
+use crate::cluster::backlog::{Backlog, MOST_BYTES};
+use crate::cluster::line::{Answer, Kinds, Line, Link};
 use crate::cluster::message::{
     DEEDS, GUEST, GUEST_SNAPSHOT, GuestJoin, GuestMessage, GuestRequest, PROTOCOL, WORD, Word, bytes_of, message_of,
     stamped_packet,
 };
 use crate::cluster::ordered::Outbox;
+use crate::cluster::queue::Flood;
 use crate::cluster::transport::{End, network};
 use crate::cluster::{ClusterError, Security};
 
@@ -54,6 +56,7 @@ pub enum Wish {
 
 enum Arrived {
     Frame(Vec<u8>),
+    Flood(Flood),
     Word(Vec<u8>),
     World(Answer),
     Bulk(u64, Answer),
@@ -91,7 +94,7 @@ pub struct Guest {
     mirror: Option<Mirror>,
     /// A snapshot that waits for long values.
     world: Option<(Word, u64, Packet<'static>)>,
-    packets: BTreeMap<u64, Packet<'static>>,
+    packets: Backlog<Packet<'static>>,
     words: BTreeMap<u64, Word>,
     gap_since: Option<Instant>,
     /// Words of the frames that were taken over since the last `follow`.
@@ -118,9 +121,10 @@ impl Guest {
         keeps: bool,
         fresh: fn() -> Graph,
     ) -> Result<Guest, ClusterError> {
-        let subject = (WORD, Arrived::Word as fn(Vec<u8>) -> Arrived);
+        let kinds =
+            Kinds { frame: Arrived::Frame, flood: Arrived::Flood, subject: (WORD, Arrived::Word), application: Arrived::Host };
         let link = Link { end: End::Guest, endpoint, security, lease, uses_memory: true, cache: None };
-        let mut line = Line::open(link, Arrived::Frame, subject, Arrived::Host)?;
+        let mut line = Line::open(link, kinds)?;
         let deeds = line.session.declare_publisher(DEEDS).congestion_control(CongestionControl::Block).wait().map_err(network)?;
         line.announce(GUEST)?;
         Ok(Guest {
@@ -137,7 +141,7 @@ impl Guest {
             replica: None,
             mirror: None,
             world: None,
-            packets: BTreeMap::new(),
+            packets: Backlog::new(MOST_BYTES),
             words: BTreeMap::new(),
             gap_since: None,
             heard: Vec::new(),
@@ -197,14 +201,22 @@ impl Guest {
 
     fn handle(&mut self, arrived: Arrived) -> Result<Option<News>, ClusterError> {
         match arrived {
-            Arrived::Frame(bytes) => match stamped_packet(bytes) {
-                Ok((epoch, packet)) if epoch == self.epoch && packet.frame() > self.frame() => {
-                    self.line.ask_for_bulk(packet.missing(&self.bulk), Arrived::Bulk);
-                    self.packets.insert(packet.frame(), packet);
+            Arrived::Frame(bytes) => {
+                let length = bytes.len();
+                match stamped_packet(bytes) {
+                    Ok((epoch, packet)) if epoch == self.epoch && packet.frame() > self.frame() => {
+                        self.line.ask_for_bulk(packet.missing(&self.bulk), Arrived::Bulk);
+                        self.packets.keep(packet.frame(), packet, length);
+                    }
+                    Ok(_) => {}
+                    Err(error) => tracing::error!("a frame cannot be used: {error}"),
                 }
-                Ok(_) => {}
-                Err(error) => tracing::error!("a frame cannot be used: {error}"),
-            },
+            }
+            Arrived::Flood(flood) => {
+                tracing::warn!("{flood} came while this application was busy, and are dropped: it fetches the world");
+                self.packets.clear();
+                self.fetch_again();
+            }
             Arrived::Word(bytes) => match message_of::<Word>(&bytes) {
                 Ok(word) if word.epoch == self.epoch => {
                     if self.replica.is_some() && word.done_of(self.line.id).is_none() {
@@ -307,7 +319,7 @@ impl Guest {
         }
         let mut news = News::None;
         while let Some(next) = self.replica.as_ref().map(|replica| replica.frame() + 1) {
-            let packet = self.packets.get(&next).filter(|packet| packet.missing(&self.bulk).is_empty());
+            let packet = self.packets.get(next).filter(|packet| packet.missing(&self.bulk).is_empty());
             let (Some(packet), true) = (packet, self.words.contains_key(&next)) else { break };
             let Some(replica) = &mut self.replica else { break };
             match replica.apply(packet, &self.bulk) {
@@ -315,7 +327,7 @@ impl Guest {
                     self.gap_since = None;
                     news = News::Frame(replica.time_s());
                     self.heard.extend(self.words.remove(&next));
-                    self.packets.remove(&next);
+                    self.packets.take(next);
                 }
                 other => {
                     tracing::error!(
@@ -328,7 +340,7 @@ impl Guest {
         }
         if let (News::None, Some(replica)) = (news, &self.replica) {
             let last = replica.frame();
-            let later = self.packets.keys().chain(self.words.keys()).any(|frame| *frame > last);
+            let later = self.packets.last().max(self.words.keys().next_back().copied()).is_some_and(|frame| frame > last);
             match (later, self.gap_since) {
                 (false, _) => self.gap_since = None,
                 (true, None) => self.gap_since = Some(Instant::now()),
@@ -358,7 +370,7 @@ impl Guest {
         let made = Replica::new(&packet, self.types.clone(), &self.bulk);
         let replica = made.inspect_err(|error| tracing::error!("the world cannot be used: {error}")).ok()?;
         let (frame, time_s) = (replica.frame(), replica.time_s());
-        self.packets = self.packets.split_off(&(frame + 1));
+        self.packets.forget_to(frame);
         self.words = self.words.split_off(&(frame + 1));
         self.epoch = epoch;
         self.replica = Some(replica);

@@ -14,6 +14,8 @@ const REPEAT_US: TimeUs = 40_000;
 const IDLE_US: TimeUs = 100_000;
 /// More frames than this are not kept to catch up with: a snapshot is less work.
 const BACKLOG: usize = 256;
+/// No frame comes so far behind a snapshot of its own run: that was of none.
+const FAR: u64 = 4096;
 /// Who answers for so long, while nothing comes of the run that is followed, is the application: the word of a later run was none.
 const BELIEVED_US: TimeUs = 1_000_000;
 
@@ -51,6 +53,8 @@ pub enum DisplayEvent {
     Unusable,
     /// The frame was drawn.
     Drawn(u64),
+    /// Frames came and were not kept: too many for the memory that there is for them.
+    Flooded,
     /// An application can be asked from now on. What was asked for before went to nobody.
     Linked,
     /// Nothing more has come for now; at least every few milliseconds. Only then is anything drawn: what came during a long drawing would
@@ -134,6 +138,12 @@ impl DisplayLock {
     pub fn step(&mut self, now_us: TimeUs, event: DisplayEvent) -> Vec<DisplayAction> {
         let mut actions = Vec::new();
         match event {
+            DisplayEvent::Frame { epoch, frame }
+                if epoch == self.epoch && self.applied.is_some_and(|applied| applied.saturating_sub(frame) > FAR) =>
+            {
+                self.begin(epoch, &mut actions);
+                self.advance(now_us, &mut actions);
+            }
             DisplayEvent::Frame { epoch, frame } if self.is_current(epoch, &mut actions) => {
                 if frame > self.newest {
                     // No later one is released, whatever was said.
@@ -193,6 +203,10 @@ impl DisplayLock {
                 }
                 self.advance(now_us, &mut actions);
             }
+            DisplayEvent::Flooded => {
+                self.lose(&mut actions);
+                self.advance(now_us, &mut actions);
+            }
             DisplayEvent::Linked => {
                 self.fetching_since_us = None;
                 self.advance(now_us, &mut actions);
@@ -211,12 +225,10 @@ impl DisplayLock {
     /// False for an earlier run of the application; a later one starts everything anew.
     fn is_current(&mut self, epoch: u64, actions: &mut Vec<DisplayAction>) -> bool {
         if epoch > self.epoch {
-            // What is being drawn goes on, but for nobody.
-            let is_applying = self.is_applying;
             // The first one that is heard of is the one that was asked.
             let fetching_since_us = self.fetching_since_us.filter(|_| self.epoch == 0);
-            *self = Self { epoch, is_applying, fetching_since_us, ..Self::default() };
-            actions.push(DisplayAction::Forget);
+            self.begin(epoch, actions);
+            self.fetching_since_us = fetching_since_us;
         }
         let is_current = epoch == self.epoch;
         if is_current {
@@ -234,9 +246,15 @@ impl DisplayLock {
         if now_us < since + BELIEVED_US {
             return false;
         }
+        self.begin(epoch, actions);
+        true
+    }
+
+    /// Nothing that came before counts.
+    fn begin(&mut self, epoch: u64, actions: &mut Vec<DisplayAction>) {
+        // What is being drawn goes on, but for nobody.
         *self = Self { epoch, is_applying: self.is_applying, ..Self::default() };
         actions.push(DisplayAction::Forget);
-        true
     }
 
     fn lose(&mut self, actions: &mut Vec<DisplayAction>) {
@@ -335,5 +353,17 @@ mod tests {
             lock.step(0, DisplayEvent::Release { epoch: 1, frame: u64::MAX, is_mine: true });
             assert!(lock.step(0, DisplayEvent::Tick).len() < 2);
         }
+    }
+
+    /// Nothing may come any more that would show the gap.
+    #[test]
+    fn who_was_flooded_fetches_the_world_at_once() {
+        let mut lock = DisplayLock::new();
+        lock.step(0, DisplayEvent::Snapshot { epoch: 1, frame: 7 });
+        lock.step(0, DisplayEvent::Tick);
+        assert_eq!(lock.step(9_000_000, DisplayEvent::Drawn(7)), [DisplayAction::Ready(7)]);
+        assert_eq!(lock.step(9_000_000, DisplayEvent::Flooded), [DisplayAction::Forget, DisplayAction::Fetch]);
+        let restored = lock.step(9_100_000, DisplayEvent::Snapshot { epoch: 1, frame: 500 });
+        assert_eq!(restored, [DisplayAction::Restore(500), DisplayAction::Show(7)]);
     }
 }

@@ -1,10 +1,14 @@
 //! A display of the simulation: it draws, freezes, and hears what came meanwhile when it is done.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 use super::super::{DisplayAction, DisplayEvent, DisplayId, DisplayLock, TimeUs};
 use super::{Message, NEVER, Simulation, TICK_US, world_after};
+use crate::cluster::queue::Queue;
+
+/// So many frames wait while a display draws or is frozen.
+const MOST_FRAMES: usize = 500;
 
 pub(super) struct Display {
     pub(super) id: DisplayId,
@@ -19,7 +23,7 @@ pub(super) struct Display {
     pub(super) shown: u64,
     /// Drawing or frozen until then; messages wait.
     pub(super) busy_until_us: TimeUs,
-    pub(super) inbox: VecDeque<Message>,
+    pub(super) inbox: Queue<Message>,
     pub(super) is_cut_off: bool,
 }
 
@@ -36,7 +40,7 @@ impl Display {
             took_us: 0,
             shown: 0,
             busy_until_us: 0,
-            inbox: VecDeque::new(),
+            inbox: Queue::new(MOST_FRAMES, |_| Message::Flooded),
             is_cut_off: false,
         }
     }
@@ -53,11 +57,14 @@ impl Simulation {
         } else if from.0 != 0 && from != display.id {
             return; // for one that crashed
         } else if self.now_us < display.busy_until_us && !matches!(message, Message::Drawn(_)) {
-            return display.inbox.push_back(message);
+            return match message {
+                Message::Frame { .. } => display.inbox.push_frame(message, 1),
+                _ => display.inbox.push(message),
+            };
         }
         self.display_handles(place, message);
         while self.now_us >= self.displays[place].busy_until_us
-            && let Some(message) = self.displays[place].inbox.pop_front()
+            && let Some(message) = self.displays[place].inbox.pop()
         {
             self.display_handles(place, message);
         }
@@ -94,10 +101,11 @@ impl Simulation {
             Message::Release { epoch, frame, may_show } => {
                 DisplayEvent::Release { epoch, frame, is_mine: may_show.contains(&display.id) }
             }
+            Message::Flooded => DisplayEvent::Flooded,
             Message::Drawn(frame) => {
                 display.busy_until_us = 0;
-                // What is drawn for a run that never was counts for none.
-                if display.lock.epoch() < NEVER {
+                // What is drawn for a run that never was counts for none, nor does a frame that never was.
+                if display.lock.epoch() < NEVER && frame < NEVER {
                     display.drawn = display.drawn.max((display.lock.epoch(), frame));
                 }
                 DisplayEvent::Drawn(frame)
@@ -121,7 +129,7 @@ impl Simulation {
                 DisplayAction::Restore(frame) => {
                     display.world = display.snapshot;
                     display.is_cold = true;
-                    display.packets = display.packets.split_off(&(frame + 1));
+                    display.packets = display.packets.split_off(&frame.saturating_add(1));
                 }
                 DisplayAction::Apply(frame) => {
                     let (of, world) = display.packets.remove(&frame).expect("only packets that came are applied");

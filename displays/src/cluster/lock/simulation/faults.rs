@@ -78,6 +78,14 @@ impl Simulation {
                 let id = self.displays[place].id;
                 self.at(100, Some(place), id, Message::Frame { epoch, frame, world });
             }
+            59..61 => {
+                // A display that starts is told of a world that never was, as far from all others as can be.
+                self.ids += 1;
+                self.displays[place] = Display::new(self.ids);
+                self.tally.forged += 1;
+                let (epoch, frame, world) = (self.epoch, u64::MAX - self.dice.below(300), self.dice.next());
+                self.at(100, Some(place), self.displays[place].id, Message::Snapshot { epoch, frame, world });
+            }
             _ => {}
         }
     }

@@ -17,7 +17,7 @@ use self::faults::{Dice, Faults};
 
 const TICK_US: TimeUs = 5_000;
 const FRAME_US: TimeUs = 16_667;
-/// No run of the application has such a number, but garbage may.
+/// No run of the application and no frame has such a number, but garbage may.
 const NEVER: u64 = 1 << 60;
 
 /// Stands for all values of a world.
@@ -27,13 +27,31 @@ fn world_after(before: u64, epoch: u64, frame: u64) -> u64 {
 
 #[derive(Clone, Debug)]
 enum Message {
-    Frame { epoch: u64, frame: u64, world: u64 },
-    Release { epoch: u64, frame: u64, may_show: Vec<DisplayId> },
-    Snapshot { epoch: u64, frame: u64, world: u64 },
-    Ready { epoch: u64, frame: u64, took_us: TimeUs },
+    Frame {
+        epoch: u64,
+        frame: u64,
+        world: u64,
+    },
+    Release {
+        epoch: u64,
+        frame: u64,
+        may_show: Vec<DisplayId>,
+    },
+    Snapshot {
+        epoch: u64,
+        frame: u64,
+        world: u64,
+    },
+    Ready {
+        epoch: u64,
+        frame: u64,
+        took_us: TimeUs,
+    },
     Fetch,
     Gone,
     Drawn(u64),
+    /// Frames came while the display was busy, and are gone.
+    Flooded,
     Tick,
 }
 

@@ -99,6 +99,26 @@ fn a_display_that_is_always_too_slow_shows_late_what_it_draws() {
     }
 }
 
+/// More frames come while a display draws than are kept: it fetches the world each time, and shows what it has drawn all the same.
+#[test]
+fn a_display_that_draws_for_very_long_keeps_few_frames() {
+    let faults = Faults { lost: 0, repeated: 0, longest_us: 300, disasters: false, together: true };
+    let pace = Pace { first_us: 100_000, each_us: 4_000 };
+    let very_slow = Pace { first_us: 10_000_000, each_us: 20_000_000 };
+    for (seed, displays) in (0..20).flat_map(|seed| [(seed, 1), (seed, 3)]) {
+        let mut simulation = Simulation::new(seed, displays, faults, pace);
+        simulation.slow = Some((0, very_slow));
+        simulation.run_until(300_000_000);
+        let (shown, fetches) = (simulation.displays[0].shown, simulation.tally.fetches - (displays as u64 - 1));
+        assert!(shown >= 12, "seed {seed}: {shown} shown");
+        assert!((shown..=shown + 2).contains(&fetches), "seed {seed}: {shown} shown, {fetches} fetches");
+        assert_eq!(simulation.tally.drops, 0, "seed {seed}");
+        simulation.slow = None;
+        simulation.run_until(340_000_000);
+        assert!(simulation.all_show(), "seed {seed}: {:?}", simulation.application);
+    }
+}
+
 /// Where a frame takes several of the application's, the one that is drawn when the next is published is not waited for as well.
 #[test]
 fn who_draws_well_within_the_timeout_is_waited_for() {
