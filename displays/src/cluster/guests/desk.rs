@@ -32,6 +32,12 @@ enum Arrived {
     Token(u64, bool),
 }
 
+/// Who asks to be let in.
+fn join_in(query: &Query) -> Result<GuestJoin, String> {
+    let payload = query.payload().ok_or("it does not say who it is")?;
+    message_of(&payload.to_bytes()).map_err(|error| error.to_string())
+}
+
 /// Where guests are served.
 pub struct Desk {
     name: String,
@@ -41,7 +47,8 @@ pub struct Desk {
     started: Instant,
     /// Messages that wait for one before them.
     early: BTreeMap<(GuestId, u64), GuestMessage>,
-    joins: Vec<Query>,
+    /// Who asks to be let in, and the question.
+    joins: Vec<(Result<GuestJoin, String>, Query)>,
     /// How often a guest had begun anew when it was let in.
     runs: HashMap<GuestId, u64>,
     /// The nodes of a guest by its own keys.
@@ -123,10 +130,9 @@ impl Desk {
                     }
                 },
                 Arrived::Join(query) => {
-                    if let Ok(join) = query.payload().map_or(Err(()), |join| message_of(&join.to_bytes()).map_err(drop)) {
-                        self.begins(&join, graph);
-                    }
-                    self.joins.push(query);
+                    let join = join_in(&query);
+                    join.iter().for_each(|join| self.begins(join, graph));
+                    self.joins.push((join, query));
                 }
                 Arrived::Token(guest, true) => self.step(OwnershipEvent::Found(GuestId(guest)), graph),
                 Arrived::Token(guest, false) => self.step(OwnershipEvent::Lost(GuestId(guest)), graph),
@@ -177,14 +183,9 @@ impl Desk {
 
     /// Lets in who asked for it. To be called after a frame was published, before the graph is written again.
     pub fn welcome(&mut self, host: &mut Host, graph: &Graph) {
-        for query in std::mem::take(&mut self.joins) {
-            let join = query.payload().map(|payload| message_of::<GuestJoin>(&payload.to_bytes()));
-            let at = join.iter().flatten().next().map_or_else(String::new, |join| host.at(join.guest));
-            let answer = match join {
-                Some(Ok(join)) => self.joins(host, graph, join),
-                Some(Err(error)) => Err(error.to_string()),
-                None => Err("it does not say who it is".into()),
-            };
+        for (join, query) in std::mem::take(&mut self.joins) {
+            let at = join.as_ref().map_or_else(|_| String::new(), |join| host.at(join.guest));
+            let answer = join.and_then(|join| self.joins(host, graph, join));
             let key = query.key_expr().clone();
             let sent = match answer {
                 Ok(bytes) => query.reply(key, bytes).wait(),
