@@ -142,6 +142,7 @@ impl SceneJson {
             fine_sub_samples: defaults.fine_sub_samples,
             graze: within("graze", self.graze.unwrap_or(defaults.graze), -1.0, 1.0)?,
             eps_scale: within("eps", self.eps.unwrap_or(defaults.eps_scale), 0.0, 1.0)?,
+            eps_at_place: defaults.eps_at_place,
             cull: self.cull.unwrap_or(defaults.cull),
             blend_casts: self.blend_casts.unwrap_or(defaults.blend_casts),
         };

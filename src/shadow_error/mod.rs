@@ -26,6 +26,8 @@ type Failure = Box<dyn std::error::Error>;
 const SIZE: [u32; 2] = [800, 600];
 /// Where shadow rays start, from their surface, as a share of the scene's size.
 const CLOSE: f64 = 1e-7;
+/// The same of how far a place is from origin and eye: what touches there is apart by less, as vertices are rounded.
+const CLOSE_AT_PLACE: f64 = 2.0 * f32::EPSILON as f64;
 
 /// What is scored.
 struct Subject {
@@ -71,7 +73,7 @@ pub(crate) fn run(args: &ShadowError) -> Result<usize, Failure> {
 
     if let Some(places) = args.eyes {
         // The eye comes as close as the near plane, where what rays start off their surfaces would be pixels.
-        subject.options.eps_scale = subject.options.eps_scale.min(CLOSE);
+        subject.options = start_close(subject.options.clone());
         if args.size.is_none() {
             subject.view.size = eye_path::SIZE;
         }
@@ -166,10 +168,14 @@ fn from_world(path: &Path, args: &ShadowError) -> Result<Subject, Failure> {
     Ok(Subject { scene, light, view, options, problems })
 }
 
-/// A world may be a kilometre wide, and its lamps stand centimetres from what casts: rays start close to surfaces.
 fn world_options(args: &ShadowError) -> TraceOptions {
     let (sub_samples, fine_sub_samples) = (args.sub_samples, args.fine_sub_samples);
-    TraceOptions { sub_samples, fine_sub_samples, eps_scale: CLOSE, ..TraceOptions::default() }
+    start_close(TraceOptions { sub_samples, fine_sub_samples, ..TraceOptions::default() })
+}
+
+/// A world may be a kilometre wide, and its lamps stand centimetres from what casts: rays start close to surfaces.
+fn start_close(options: TraceOptions) -> TraceOptions {
+    TraceOptions { eps_scale: options.eps_scale.min(CLOSE), eps_at_place: CLOSE_AT_PLACE, ..options }
 }
 
 /// The models of a scene file, with its light alone.

@@ -36,6 +36,9 @@ pub struct TraceOptions {
     pub graze: f64,
     /// Distance of a shadow ray's start from its surface, as a share of the diagonal of the scene's bounds.
     pub eps_scale: f64,
+    /// At most this share of how far the surface is from the origin and from the eye: in a wide world, what is nearby keeps
+    /// shadows that are finer than the world is wide.
+    pub eps_at_place: f64,
     /// Single-sided faces are not there when seen from behind. They cast shadows from both sides all the same.
     pub cull: bool,
     /// Surfaces with alpha mode blend, which the eye does not see here, cast shadows.
@@ -44,7 +47,15 @@ pub struct TraceOptions {
 
 impl Default for TraceOptions {
     fn default() -> TraceOptions {
-        TraceOptions { sub_samples: 4, fine_sub_samples: 0, graze: 0.03, eps_scale: 1e-5, cull: true, blend_casts: true }
+        TraceOptions {
+            sub_samples: 4,
+            fine_sub_samples: 0,
+            graze: 0.03,
+            eps_scale: 1e-5,
+            eps_at_place: f64::INFINITY,
+            cull: true,
+            blend_casts: true,
+        }
     }
 }
 
@@ -158,7 +169,8 @@ impl Tracer {
         } else {
             Mask::LIT
         };
-        let eps = self.soup.diagonal() * options.eps_scale;
+        let away = point.length() + point.distance(origin);
+        let eps = (self.soup.diagonal() * options.eps_scale).min(away * options.eps_at_place);
         let receives = self.soup.shapes[triangle.shape as usize].receives;
         // From the start on, the ray must end at the light, or one that stands in a surface is hidden by what it stands in.
         let start = point + facing * eps;

@@ -34,6 +34,21 @@ const SHADOW: u8 = Mask::SHADOW;
 const AWAY: u8 = Mask::AWAY;
 const OUTSIDE: u8 = Mask::OUTSIDE;
 
+/// A sun so low that a ray which starts a quarter of a millimetre off the ground is out of the shadow six millimetres too soon.
+#[test]
+fn wide_worlds_keep_fine_shadows() {
+    let world = scene(vec![ground(1000.0), box_at(vec3(0.0, 1.0, 0.0))]);
+    let wide = TraceOptions { eps_scale: 1e-7, ..TraceOptions::default() };
+    let fine = TraceOptions { eps_at_place: 2.0 * f64::from(f32::EPSILON), ..wide.clone() };
+    let low = sun(vec3(1.0, -0.05, 0.0));
+    for (options, x, expected) in
+        [(&wide, 40.99, SHADOW), (&wide, 40.997, LIT), (&fine, 40.997, SHADOW), (&fine, 41.001, LIT), (&fine, 60.0, LIT)]
+    {
+        let found = class(&world, &low, vec3(41.0, 1.0, 0.5), vec3(x, 0.0, 0.0), options);
+        assert_eq!(found, expected, "{x} with {options:?}");
+    }
+}
+
 #[test]
 fn box_in_the_sun() {
     // From x = 1 its shadow is as long as the box is high: 2.
