@@ -2,7 +2,7 @@
 
 use crate::cache::{GpuMaterial, GpuMesh, Slab};
 use crate::cutouts::{Cutout, CutoutJob};
-use crate::deform::Deformer;
+use crate::deform::{Deformed, Deformer};
 use crate::draws::{Casting, Draws};
 use crate::lights::{Lights, leaves_holes_to_maps};
 use crate::plan::{BLACK_FILM, Purpose};
@@ -11,6 +11,7 @@ use crate::stats::Problems;
 use crate::volumes::{Cone, Seen, Surface, TurnedBox, VolumeCaster, VolumeJob, VolumeLight};
 use crate::{enclosed, uniforms};
 use glam::{Mat4, Vec3, Vec4};
+use std::sync::Arc;
 use umbriel_scene::{
     Aabb, AlphaMode, Drawable, Light, LightKind, Material, Mesh, Scene, ShadowMethod, StencilGroup, StencilMode, Topology,
 };
@@ -172,18 +173,44 @@ pub(crate) fn seen(drawables: impl Iterator<Item = usize>, scene: &Scene, view_f
 /// Triangles of a mesh whose triangles are looked at one by one for what they hide: walls, quays, grounds.
 const MOST_HIDING: usize = 64;
 
-impl Things<'_> {
-    fn caster(&self, scene: &Scene, index: usize) -> Option<VolumeCaster> {
-        let drawable = scene.drawables.get(index)?;
+/// A shape as it is drawn.
+struct Shape<'a> {
+    drawable: &'a Drawable,
+    mesh: &'a Arc<Mesh>,
+    rest: &'a GpuMesh,
+    deformed: Option<&'a Deformed>,
+}
+
+impl Shape<'_> {
+    fn positions(&self) -> wgpu::Buffer {
+        self.deformed.map_or(&self.rest.positions, |d| &d.positions).clone()
+    }
+
+    fn bounds(&self) -> TurnedBox {
+        bounds_of(self.drawable, self.deformed.is_some())
+    }
+}
+
+impl<'a> Things<'a> {
+    fn shape(&self, scene: &'a Scene, index: usize) -> Option<Shape<'a>> {
         let (mesh, deformed) = self.draws.mesh_of(index)?;
-        let rest = self.meshes.get(mesh)?.as_ref()?;
-        let deformed = deformed.and_then(|d| self.deformer.get(d));
+        Some(Shape {
+            drawable: scene.drawables.get(index)?,
+            mesh: self.meshes.key(mesh)?,
+            rest: self.meshes.get(mesh)?.as_ref()?,
+            deformed: deformed.and_then(|d| self.deformer.get(d)),
+        })
+    }
+
+    fn caster(&self, scene: &Scene, index: usize) -> Option<VolumeCaster> {
+        let shape = self.shape(scene, index)?;
+        let Shape { drawable, deformed, .. } = shape;
         Some(VolumeCaster {
-            mesh: self.meshes.key(mesh)?.clone(),
-            positions: deformed.map_or(&rest.positions, |d| &d.positions).clone(),
+            mesh: shape.mesh.clone(),
+            positions: shape.positions(),
             positions_revision: deformed.map_or(0, |d| d.revision),
             world_from_object: drawable.world_from_object,
-            bounds: bounds_of(drawable, deformed.is_some()),
+            bounds: shape.bounds(),
             surface: match drawable.material.alpha {
                 AlphaMode::Opaque if drawable.material.double_sided => Surface::BothSides,
                 AlphaMode::Opaque if deformed.is_none() => Surface::Front,
@@ -193,18 +220,16 @@ impl Things<'_> {
     }
 
     fn cutout(&self, scene: &Scene, index: usize, material: u32) -> Option<Cutout> {
-        let drawable = scene.drawables.get(index)?;
-        let (mesh, deformed) = self.draws.mesh_of(index)?;
-        let rest = self.meshes.get(mesh)?.as_ref().filter(|mesh| mesh.topology == Topology::Triangles)?;
-        let deformed = deformed.and_then(|d| self.deformer.get(d));
+        let shape = self.shape(scene, index).filter(|shape| shape.rest.topology == Topology::Triangles)?;
+        let rest = shape.rest;
         Some(Cutout {
-            positions: deformed.map_or(&rest.positions, |d| &d.positions).clone(),
+            positions: shape.positions(),
             indices: rest.indices.clone(),
             attributes: rest.attributes.clone(),
             triangle_count: rest.index_count / 3,
             material: self.materials.get(material)?.group.clone(),
-            world_from_object: drawable.world_from_object,
-            bounds: bounds_of(drawable, deformed.is_some()),
+            world_from_object: shape.drawable.world_from_object,
+            bounds: shape.bounds(),
         })
     }
 }

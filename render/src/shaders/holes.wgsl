@@ -53,11 +53,7 @@ fn samples_there_at_full_size(look: Look, covered: u32) -> u32 {
     var there = 0u;
     for (var i = 0u; i < 4u; i++) {
         let place = place_of_sample(look, i);
-        var alpha = material.base_color.a * place.z;
-        if has_texture(0u) {
-            alpha *= textureSampleLevel(base_color_texture, base_color_sampler, place.xy, 0.0).a;
-        }
-        there |= select(1u << i, 0u, alpha < material.alpha_cutoff);
+        there |= select(1u << i, 0u, full_size_alpha_at(place.xy, place.z) < material.alpha_cutoff);
     }
     return covered & there;
 }

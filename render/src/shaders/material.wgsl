@@ -89,9 +89,14 @@ fn texture_place(slot: u32, uv0: vec2<f32>, uv1: vec2<f32>) -> vec2<f32> {
 
 // Alpha with texture and vertex colour, from the picture at its full size.
 fn full_size_alpha(uv0: vec2<f32>, uv1: vec2<f32>, vertex_alpha: f32) -> f32 {
+    return full_size_alpha_at(texture_place(0u, uv0, uv1), vertex_alpha);
+}
+
+// The same at a place in the base colour's texture.
+fn full_size_alpha_at(place: vec2<f32>, vertex_alpha: f32) -> f32 {
     var alpha = material.base_color.a * vertex_alpha;
     if has_texture(0u) {
-        alpha *= textureSampleLevel(base_color_texture, base_color_sampler, texture_place(0u, uv0, uv1), 0.0).a;
+        alpha *= textureSampleLevel(base_color_texture, base_color_sampler, place, 0.0).a;
     }
     return alpha;
 }
