@@ -8,7 +8,7 @@ use crate::lights::{Lights, leaves_holes_to_maps};
 use crate::plan::{BLACK_FILM, Purpose};
 use crate::slots::Slots;
 use crate::stats::Problems;
-use crate::volumes::{Cone, Seen, Surface, TurnedBox, VolumeCaster, VolumeJob, VolumeLight};
+use crate::volumes::{self, Cone, Seen, Surface, TurnedBox, VolumeCaster, VolumeJob, VolumeLight};
 use crate::{enclosed, uniforms};
 use glam::{Mat4, Vec3, Vec4};
 use std::sync::Arc;
@@ -147,31 +147,32 @@ fn bounds_of(drawable: &Drawable, is_deformed: bool) -> TurnedBox {
 
 /// What is known of the surfaces that a view shows; none where a receiver has no bounds.
 pub(crate) fn seen(drawables: impl Iterator<Item = usize>, scene: &Scene, view_from_world: &Mat4) -> Option<Seen> {
-    let eye = view_from_world.inverse().w_axis.truncate();
+    let eye = view_from_world.inverse().w_axis.truncate().as_dvec3();
     let mut seen = Seen::default();
     for index in drawables {
         let d = &scene.drawables[index];
-        if d.receives_shadow && d.material.alpha != AlphaMode::Blend {
-            if d.bounds_in_world.is_empty() {
-                return None;
-            }
-            seen.receivers.push(bounds_of(d, d.pose.is_some()));
+        let receives = d.receives_shadow && d.material.alpha != AlphaMode::Blend;
+        if receives && d.bounds_in_world.is_empty() {
+            return None;
         }
-        let is_whole = d.material.alpha == AlphaMode::Opaque && d.material.shader.is_none() && d.pose.is_none();
-        if is_whole && d.mesh.topology == Topology::Triangles && d.mesh.triangle_count() <= MOST_HIDING {
-            let front = if d.world_from_object.determinant() < 0.0 { -1.0 } else { 1.0 };
-            seen.hiding.extend(d.mesh.indices.chunks_exact(3).filter_map(|t| {
-                let [a, b, c] = [0, 1, 2].map(|i| d.world_from_object.transform_point3(d.mesh.positions[t[i] as usize]));
-                let is_seen = front * (b - a).cross(c - a).dot(eye - a) > 0.0;
-                (d.material.double_sided || is_seen).then_some([a, b, c])
-            }));
+        let is_small = d.mesh.topology == Topology::Triangles && d.mesh.triangle_count() <= MOST_FACES;
+        if d.pose.is_some() || !is_small {
+            seen.boxes.extend(receives.then(|| bounds_of(d, d.pose.is_some())));
+            continue;
+        }
+        let front = if d.world_from_object.determinant() < 0.0 { -1.0 } else { 1.0 };
+        let hides = d.material.alpha == AlphaMode::Opaque && d.material.shader.is_none();
+        for face in volumes::faces(&d.mesh, &d.world_from_object) {
+            let over = if d.material.double_sided { f64::INFINITY } else { front * face.distance_to(eye) };
+            seen.hiding.extend((hides && over > 0.0).then_some(face));
+            seen.faces.extend((receives && over > -face.margin()).then_some(face));
         }
     }
     Some(seen)
 }
 
-/// Triangles of a mesh whose triangles are looked at one by one for what they hide: walls, quays, grounds.
-const MOST_HIDING: usize = 64;
+/// Triangles of a mesh whose faces are looked at one by one: walls, quays, grounds.
+const MOST_FACES: usize = 64;
 
 /// A shape as it is drawn.
 struct Shape<'a> {

@@ -432,8 +432,8 @@ fn all_settings_give_the_same_stencil() {
             for (v, (name, settings)) in variants.into_iter().enumerate() {
                 let (found, _, draws) = drawn(settings);
                 let differ = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
-                // An edge that ends elsewhere may be rounded to another sample.
-                let allowed = if settings.fitted { expected.len() / 10_000 } else { 0 };
+                // An edge that ends elsewhere, or is cut to another rectangle, may be rounded to another sample.
+                let allowed = if settings.fitted || settings.culling { expected.len() / 10_000 } else { 0 };
                 assert!(
                     differ <= allowed,
                     "{differ} differ: {name}, view {i} from {eye} to {at}, {samples} samples, light {toward_light}: {draws:?}"
@@ -446,6 +446,6 @@ fn all_settings_give_the_same_stencil() {
     let [auto, culled, _, all, _, _, unbounded] = totals;
     // Each of them had something to do.
     assert!(auto.z_pass > 40 && auto.z_fail > 40, "{auto:?}");
-    assert!(all.culled > unbounded.culled + 5, "{all:?} {unbounded:?}");
+    assert!(all.culled > unbounded.culled + 25, "{all:?} {unbounded:?}");
     assert!(culled.culled > 20 && all.culled > 20 && all.far_caps < culled.far_caps + all.z_fail, "{culled:?} {all:?}");
 }

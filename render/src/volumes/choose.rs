@@ -20,10 +20,9 @@
 //! caps outside of the frustum cover no pixel.
 
 use super::reach::{self, Reach};
-use super::tiles::{Seen, Tiles};
+use super::seen::{self, Seen, Shown};
 use super::{Surface, TurnedBox, VolumeLight, hull};
 use glam::{DMat4, DVec3, DVec4};
-use std::cell::OnceCell;
 use umbriel_scene::{Aabb, View, VolumeCounting};
 
 /// A view, and what shadows may be seen on in it.
@@ -40,9 +39,7 @@ pub struct Sight {
     pub(super) origin: [u32; 2],
     receivers: Aabb,
     view: View,
-    seen: Option<Seen>,
-    /// Made when the first volume asks.
-    tiles: OnceCell<Tiles>,
+    shown: Option<Shown>,
 }
 
 /// A rectangle of pixels: left, top, width, height.
@@ -93,19 +90,14 @@ impl Sight {
             origin: [0, 0],
             receivers,
             view: view.clone(),
-            seen: None,
-            tiles: OnceCell::new(),
+            shown: None,
         }
     }
 
     /// The same with what is known of surfaces in it: all that shadows may fall on, or else these go without a shadow.
     pub fn with(self, seen: Seen) -> Sight {
-        Sight { seen: Some(seen), ..self }
-    }
-
-    fn tiles(&self) -> Option<&Tiles> {
-        let seen = self.seen.as_ref()?;
-        Some(self.tiles.get_or_init(|| Tiles::new(&self.view, seen)))
+        let shown = Shown::new(seen, &self.view, self.clip_from_world, self.ahead);
+        Sight { shown: Some(shown), ..self }
     }
 
     /// The same in a target where the view begins at this pixel.
@@ -215,13 +207,9 @@ impl<'a> Watch<'a> {
             choice.scissor = overlap(choice.scissor, sight.pixels(&common(&swept, &self.lit))?)?;
         }
         if self.light.settings.depth_bounds
-            && let Some(tiles) = sight.tiles()
+            && let Some(shown) = &sight.shown
         {
-            let along = toward.truncate() - bounds.in_world.centre().as_dvec3() * toward.w;
-            let is_straight = bounds.edges == DVec3::AXES;
-            let axes = bounds.edges.map(|edge| along.cross(edge)).into_iter().chain(normals.into_iter().filter(|_| !is_straight));
-            let axes: Vec<DVec3> = axes.collect();
-            choice.scissor = tiles.touched(&volume, &axes, choice.scissor, margin)?;
+            choice.scissor = shown.touched(bounds, &seen::planes(bounds, toward, sight.eye, margin), choice.scissor)?;
         }
         Some(choice)
     }

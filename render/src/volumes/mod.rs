@@ -22,10 +22,12 @@ mod choose;
 mod draw;
 mod extent;
 mod extract;
+mod faces;
 mod hull;
 mod layers;
 mod parts;
 mod reach;
+mod seen;
 mod tiles;
 mod turned;
 
@@ -33,7 +35,8 @@ pub(crate) use cache::GpuPart;
 pub use choose::Sight;
 pub(crate) use extent::Extent;
 pub(crate) use extract::CasterUniform;
-pub use tiles::Seen;
+pub use faces::{Face, faces};
+pub use seen::Seen;
 pub use turned::TurnedBox;
 
 use choose::Watch;

@@ -1,12 +1,7 @@
-//! What each part of a view can show of a shadow: the depth bounds of 001 section 5.3, tile by tile, where it asks a whole
-//! volume by one pair of depths and a card that tests them.
-//!
-//! The view is laid out in tiles. In each, whatever receives lies between two depths, found from the boxes around receivers;
-//! triangles that cover a tile hide what is behind them. A volume that touches no such cell changes nothing that is seen:
-//! over all of its pixels it counts to 0, whichever way it is counted. No depth is read back, so that no frame waits.
+//! What hides what, tile by tile of a view: triangles that cover a tile hide what is behind them. No depth is read back, so that
+//! no frame waits.
 
-use super::TurnedBox;
-use super::hull::{self, extent};
+use super::faces::Face;
 use glam::{DMat4, DVec3, DVec4};
 use umbriel_scene::View;
 
@@ -15,62 +10,37 @@ const SMALLEST: u32 = 8;
 /// Tiles across and down, at most.
 const MOST: u32 = 32;
 
-/// The depth bounds of a view.
+/// The tiles of a view.
 pub(super) struct Tiles {
     eye: DVec3,
     /// Pixels of a tile's side.
     side: u32,
     across: u32,
-    /// The view's direction and the axes of the world, unit vectors.
-    fixed: [DVec3; 4],
-    cells: Vec<Option<Cell>>,
-}
-
-/// A tile with its depths: the part of the view's pyramid that holds all it shows of receivers.
-struct Cell {
-    tile: Tile,
-    far_m: f64,
-    corners: [DVec4; 8],
-    /// From where to where it goes along the fixed axes.
-    extents: [(f64, f64); 4],
+    tiles: Vec<Tile>,
 }
 
 /// The pyramid behind a tile.
-#[derive(Clone, Copy)]
 struct Tile {
-    /// To the corners, at depth 1, in the world.
+    /// Along its edges, to depth 1, in the world.
     rays: [DVec3; 4],
-    /// The same in the view.
-    view_rays: [DVec3; 4],
-    /// Planes through the eye, normals inward.
-    normals: [DVec3; 4],
+    covers: Vec<Cover>,
 }
 
-/// A box that shadows may fall on, from the eye.
-struct Receiver {
-    corners: [DVec3; 8],
-    /// Normals of its sides, and from where to where it goes along them.
-    slabs: [(DVec3, f64, f64); 3],
+/// A face that covers a tile.
+struct Cover {
+    /// Where the tile's edges end on it, in the world.
+    ends: [DVec3; 4],
+    /// 1 / depth there and a little beyond. Over the picture, that is linear for a plane.
+    nearness: [f64; 4],
 }
 
-impl Receiver {
-    fn new(b: &TurnedBox, eye: DVec3) -> Receiver {
-        let corners = b.corners.map(|c| c.truncate() - eye);
-        let slab = |normal: DVec3| {
-            let heights = corners.map(|c| normal.dot(c));
-            (normal, heights.into_iter().fold(f64::INFINITY, f64::min), heights.into_iter().fold(f64::NEG_INFINITY, f64::max))
-        };
-        Receiver { corners, slabs: b.normals().map(slab) }
-    }
-}
-
-/// What is seen of a scene in a view, as far as shadows are concerned.
-#[derive(Clone, Debug, Default)]
-pub struct Seen {
-    /// Boxes around all that shadows may fall on.
-    pub receivers: Vec<TurnedBox>,
-    /// Some of the triangles in the depth buffer, in the world.
-    pub hiding: Vec<[glam::Vec3; 3]>,
+/// What is looked for in tiles.
+#[derive(Clone, Copy)]
+pub(super) enum Sought<'a> {
+    /// Something in the plane of a face.
+    On(&'a Face),
+    /// Something at this depth or beyond.
+    Beyond(f64),
 }
 
 /// How the picture is cut into tiles.
@@ -136,58 +106,38 @@ impl Grid {
 }
 
 impl Tiles {
-    /// Of a view, with its depths.
-    pub(super) fn new(view: &View, seen: &Seen) -> Tiles {
+    /// Of a view, with the faces in its depth buffer that hide what is behind them.
+    pub(super) fn new(view: &View, hiding: &[Face]) -> Tiles {
         let view_from_world = view.view_from_world.as_dmat4();
         let world_from_view = view_from_world.inverse();
-        let eye = world_from_view.transform_point3(DVec3::ZERO);
+        let eye = world_from_view.w_axis.truncate();
         let grid = Grid::new(view);
-        let (across, down) = (grid.across, grid.down);
-        let tiles = (0..across * down).map(|i| Tile::new(grid.rays(i % across, i / across), &world_from_view));
-        let tiles: Vec<Tile> = tiles.collect();
-        let mut depths = vec![(f64::INFINITY, 0f64); tiles.len()];
-        let mut each = |[left, right, top, bottom]: [u32; 4], change: &mut dyn FnMut(&Tile, &mut (f64, f64))| {
-            for i in (top..bottom).flat_map(|y| (left..right).map(move |x| (y * across + x) as usize)) {
-                change(&tiles[i], &mut depths[i]);
-            }
-        };
-        for b in &seen.receivers {
-            let around = grid.around(&b.corners.map(|c| view_from_world.transform_point3(c.truncate())));
-            let receiver = Receiver::new(b, eye);
-            each(around, &mut |tile, depths| {
-                if let Some((low, high)) = tile.span(&view_from_world, &receiver) {
-                    *depths = (depths.0.min(low), depths.1.max(high));
+        let mut tiles: Vec<Tile> = (0..grid.across * grid.down)
+            .map(|i| grid.rays(i % grid.across, i / grid.across).map(|ray| world_from_view.transform_vector3(ray)))
+            .map(|rays| Tile { rays, covers: Vec::new() })
+            .collect();
+        for face in hiding {
+            let hiding = Hiding::new(face, &view_from_world);
+            let [left, right, top, bottom] = grid.around(&hiding.corners);
+            for (x, y) in (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y))) {
+                if let Some(depths) = hiding.beyond(&grid.rays(x, y), grid.near) {
+                    tiles[(y * grid.across + x) as usize].cover(depths, eye);
                 }
-            });
+            }
         }
-        for triangle in &seen.hiding {
-            let hiding = Hiding::new(triangle.map(|p| view_from_world.transform_point3(p.as_dvec3())));
-            each(grid.around(&hiding.corners), &mut |tile, depths| {
-                depths.1 = hiding.beyond(tile, grid.near).map_or(depths.1, |far| depths.1.min(far));
-            });
-        }
-        let fixed = [-view_from_world.row(2).truncate().normalize_or_zero(), DVec3::X, DVec3::Y, DVec3::Z];
-        let cells = tiles.into_iter().zip(depths).map(|(tile, (low, high))| {
-            // Rounding, of the device and of the boxes, and what lies exactly in a plane.
-            let slack = 1e-3 + 1e-4 * high;
-            let (low, high) = ((low - slack).max(grid.near), high + slack);
-            (low <= high).then(|| Cell::new(tile, eye, &fixed, low, high))
-        });
-        Tiles { eye, side: grid.side, across, fixed, cells: cells.collect() }
+        Tiles { eye, side: grid.side, across: grid.across, tiles }
     }
 
-    /// The smallest rectangle of pixels, inside of `within`, outside of which a hull touches nothing that is seen. `axes` are
-    /// further directions in which it may be apart from it.
-    pub(super) fn touched(&self, volume: &[DVec4], axes: &[DVec3], within: [u32; 4], margin: f64) -> Option<[u32; 4]> {
+    /// The smallest rectangle of pixels, inside of `within`, in which what is sought may be seen, and something behind all of `planes`
+    /// (unit normals inward).
+    pub(super) fn seen(&self, within: [u32; 4], sought: Sought<'_>, planes: &[DVec4]) -> Option<[u32; 4]> {
         let [left, top, width, height] = within;
-        let fixed = self.fixed.map(|axis| extent(volume, axis));
-        let axes: Vec<_> = axes.iter().filter_map(|a| a.try_normalize()).map(|axis| (axis, extent(volume, axis))).collect();
         let mut found: Option<[u32; 4]> = None;
         for y in top / self.side..=(top + height - 1) / self.side {
             for x in left / self.side..=(left + width - 1) / self.side {
-                let Some(Some(cell)) = self.cells.get((y * self.across + x) as usize) else { continue };
                 let inside = found.is_some_and(|[l, t, r, b]| l <= x && x < r && t <= y && y < b);
-                if inside || cell.is_apart(self.eye, volume, &fixed, &axes, margin) {
+                let tile = &self.tiles[(y * self.across + x) as usize];
+                if inside || tile.hides(sought, self.eye) || tile.is_before_one_of(planes, self.eye) {
                     continue;
                 }
                 let [l, t, r, b] = found.unwrap_or([x, y, x, y]);
@@ -200,114 +150,63 @@ impl Tiles {
     }
 }
 
-impl Cell {
-    fn new(tile: Tile, eye: DVec3, fixed: &[DVec3; 4], near_m: f64, far_m: f64) -> Cell {
-        let corner = |i: usize| (eye + tile.rays[i % 4] * if i < 4 { near_m } else { far_m }).extend(1.0);
-        let corners = std::array::from_fn(corner);
-        Cell { tile, far_m, corners, extents: fixed.map(|axis| extent(&corners, axis)) }
-    }
-
-    fn is_apart(&self, eye: DVec3, volume: &[DVec4], fixed: &[(f64, f64); 4], axes: &[(DVec3, (f64, f64))], margin: f64) -> bool {
-        // Vertices lie on a grid in the picture: a small part of a pixel.
-        let margin = margin + 1e-4 * self.far_m;
-        let is_between = |own: (f64, f64), (low, high): (f64, f64)| own.0 > high + margin || low > own.1 + margin;
-        let is_beside = |n: &DVec3| hull::is_behind(volume, n.extend(-n.dot(eye)), margin);
-        self.extents.iter().zip(fixed).any(|(own, other)| is_between(*own, *other))
-            || self.tile.normals.iter().any(is_beside)
-            || axes.iter().any(|(axis, other)| is_between(extent(&self.corners, *axis), *other))
-    }
-}
-
 impl Tile {
-    fn new(view_rays: [DVec3; 4], world_from_view: &DMat4) -> Tile {
-        let rays = view_rays.map(|ray| world_from_view.transform_vector3(ray));
-        let centre = rays.iter().sum::<DVec3>();
-        let normal = |i: usize| {
-            let n = rays[i].cross(rays[(i + 1) % 4]).normalize_or_zero();
-            if n.dot(centre) < 0.0 { -n } else { n }
-        };
-        Tile { rays, view_rays, normals: std::array::from_fn(normal) }
+    /// A face more covers it, in these depths along its rays.
+    fn cover(&mut self, depths: [f64; 4], eye: DVec3) {
+        let ends = std::array::from_fn(|i| eye + self.rays[i] * depths[i]);
+        // Rounding, of the device as well.
+        let nearness = depths.map(|depth| 1.0 / (depth + 1e-3 + 1e-4 * depth));
+        self.covers.push(Cover { ends, nearness });
     }
 
-    /// Nearest and farthest depth of what a box has in the pyramid: at its corners there, where the pyramid's edges pass it,
-    /// and where its edges pass the pyramid's sides.
-    fn span(&self, view_from_world: &DMat4, b: &Receiver) -> Option<(f64, f64)> {
-        let depth = |p: DVec3| -view_from_world.transform_vector3(p).z;
-        let corners = &b.corners;
-        let heights = corners.map(|c| self.normals.map(|n| n.dot(c)));
-        if (0..4).any(|side| heights.iter().all(|h| h[side] < 0.0)) {
-            return None;
-        }
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        let mut take = |w: f64| (low, high) = (low.min(w), high.max(w));
-        for (corner, heights) in corners.iter().zip(&heights) {
-            if heights.iter().all(|h| *h >= 0.0) {
-                take(depth(*corner));
-            }
-        }
-        for ray in self.rays {
-            let (mut from, mut to) = (0f64, f64::INFINITY);
-            for (normal, low, high) in &b.slabs {
-                let sinks = normal.dot(ray);
-                let (a, b) = (low / sinks, high / sinks);
-                // 0 / 0 where the ray runs in a side of the box: no bound.
-                if !a.is_nan() && !b.is_nan() {
-                    (from, to) = (from.max(a.min(b)), to.min(a.max(b)));
-                }
-            }
-            if from <= to {
-                take(from);
-                take(to);
-            }
-        }
-        let slack = 1e-9 * corners.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max);
-        for (i, bit) in (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, i | bit))).filter(|(i, j)| i != j) {
-            for (a, b) in heights[i].into_iter().zip(heights[bit]) {
-                if (a < 0.0) != (b < 0.0) {
-                    let p = corners[i].lerp(corners[bit], a / (a - b));
-                    if self.normals.iter().all(|n| n.dot(p) >= -slack) {
-                        take(depth(p));
-                    }
-                }
-            }
-        }
-        (high > 0.0).then(|| (low.max(0.0), high))
+    /// Is what is sought behind a face that covers the tile, wherever it is in it?
+    fn hides(&self, sought: Sought<'_>, eye: DVec3) -> bool {
+        let nearness = match sought {
+            Sought::On(face) => self.rays.map(|ray| face.nearness(eye, ray)),
+            Sought::Beyond(depth) => [1.0 / depth; 4],
+        };
+        self.covers.iter().any(|cover| nearness.iter().zip(&cover.nearness).all(|(own, other)| own < other))
+    }
+
+    /// Is all that is seen in it outside of a plane? It lies between the eye and a face that covers the tile.
+    fn is_before_one_of(&self, planes: &[DVec4], eye: DVec3) -> bool {
+        let is_outside = |plane: &DVec4, p: DVec3| plane.dot(p.extend(1.0)) < 0.0;
+        let mut outside_of = planes.iter().filter(|plane| is_outside(plane, eye));
+        outside_of.any(|plane| self.covers.iter().any(|cover| cover.ends.iter().all(|end| is_outside(plane, *end))))
     }
 }
 
-/// A triangle that may hide what is behind it, in the view.
+/// A face that may hide what is behind it, in the view.
 struct Hiding {
-    corners: [DVec3; 3],
+    corners: Vec<DVec3>,
     normal: DVec3,
     /// How far its plane is from the eye, times the length of the normal.
     over: f64,
-    /// Planes through the eye and its sides; what is in all of them is seen through the triangle.
-    sides: [DVec3; 3],
+    /// Planes through the eye and its sides; what is in all of them is seen through the face.
+    sides: Vec<DVec3>,
 }
 
 impl Hiding {
-    fn new(corners: [DVec3; 3]) -> Hiding {
-        let [a, b, c] = corners;
-        let normal = (b - a).cross(c - a);
-        let over = normal.dot(a);
-        let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| from.cross(to) * over.signum());
+    fn new(face: &Face, view_from_world: &DMat4) -> Hiding {
+        let corners: Vec<DVec3> = face.corners().iter().map(|p| view_from_world.transform_point3(*p)).collect();
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let over = normal.dot(corners[0]);
+        let next = corners.iter().cycle().skip(1);
+        let sides = corners.iter().zip(next).map(|(from, to)| from.cross(*to) * over.signum()).collect();
         Hiding { corners, normal, over, sides }
     }
 
-    /// Depth beyond which it hides everything in a tile; none where it does not cover the tile.
-    ///
-    /// Over the picture, 1 / depth of a plane is linear, so that it is least at a corner.
-    fn beyond(&self, tile: &Tile, near: f64) -> Option<f64> {
-        let mut farthest = 0f64;
-        for ray in tile.view_rays {
-            let t = self.over / self.normal.dot(ray);
+    /// Depths along the edges of a tile beyond which it hides everything there; none where it does not cover the tile.
+    fn beyond(&self, rays: &[DVec3; 4], near: f64) -> Option<[f64; 4]> {
+        let mut depths = [0.0; 4];
+        for (ray, depth) in rays.iter().zip(&mut depths) {
+            *depth = self.over / self.normal.dot(*ray);
             // What is in front of the near plane is not drawn.
-            let is_drawn = t > near * (1.0 + 1e-6) && t.is_finite();
-            if !is_drawn || self.sides.iter().any(|side| side.dot(ray) <= 0.0) {
+            let is_drawn = *depth > near * (1.0 + 1e-6) && depth.is_finite();
+            if !is_drawn || self.sides.iter().any(|side| side.dot(*ray) <= 0.0) {
                 return None;
             }
-            farthest = farthest.max(t);
         }
-        Some(farthest)
+        Some(depths)
     }
 }

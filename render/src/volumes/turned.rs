@@ -34,6 +34,15 @@ impl TurnedBox {
         TurnedBox { in_world, corners, edges }
     }
 
+    /// Planes that hold it, unit normals inward.
+    pub(super) fn planes(&self) -> impl Iterator<Item = DVec4> {
+        let margin = hull::margin(&self.corners);
+        self.normals().into_iter().filter_map(DVec3::try_normalize).flat_map(move |normal| {
+            let (low, high) = hull::extent(&self.corners, normal);
+            [normal.extend(margin - low), (-normal).extend(margin + high)]
+        })
+    }
+
     /// Normals of its faces, of any length.
     pub(super) fn normals(&self) -> [DVec3; 3] {
         let [x, y, z] = self.edges;

@@ -3,7 +3,7 @@
 use crate::shapes::Thing;
 use glam::{Mat4, Vec4};
 use umbriel_render::volumes::{
-    Depth, Seen, Sight, Surface, TurnedBox, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats,
+    Depth, Seen, Sight, Surface, TurnedBox, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats, faces,
 };
 use umbriel_scene::{Aabb, View, VolumeSettings};
 use wgpu::util::DeviceExt;
@@ -182,14 +182,13 @@ impl Gpu {
         let job = VolumeJob { light, casters: casters.iter().map(Loaded::caster).collect(), receivers: receives };
         let mut sight = Sight::new(view, receives);
         if !receives.is_empty() {
-            // Surfaces are drawn from both sides.
-            let hiding = casters.iter().chain(receivers).flat_map(|l| {
-                let (mesh, place) = (&l.thing.mesh, l.thing.world_from_object);
-                let corner = move |i: &u32| place.transform_point3(mesh.positions[*i as usize]);
-                mesh.indices.chunks_exact(3).map(move |t| [corner(&t[0]), corner(&t[1]), corner(&t[2])])
-            });
-            let receivers = casters.iter().chain(receivers).map(|l| l.caster().bounds).collect();
-            sight = sight.with(Seen { receivers, hiding: hiding.collect() });
+            // Surfaces are drawn from both sides. Every fourth is known by its box.
+            let things = || casters.iter().chain(receivers).enumerate();
+            let all = things().flat_map(|(_, l)| faces(&l.thing.mesh, &l.thing.world_from_object)).collect();
+            let known = things().filter(|(i, _)| i % 4 != 3);
+            let boxes = things().filter(|(i, _)| i % 4 == 3).map(|(_, l)| l.caster().bounds).collect();
+            let faces = known.flat_map(|(_, l)| faces(&l.thing.mesh, &l.thing.world_from_object)).collect();
+            sight = sight.with(Seen { faces, boxes, hiding: all });
         }
         let stats = self.pass.prepare(&self.device, &mut encoder, &[job]);
         self.surfaces(&mut encoder, casters.iter().chain(receivers), &view_group, &target_view);

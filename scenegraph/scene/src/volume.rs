@@ -12,8 +12,7 @@ pub struct VolumeSettings {
     pub silhouettes: Silhouettes,
     /// Leaves out volumes, caps and parts of the screen that cannot show a shadow (001 section 5.2).
     pub culling: bool,
-    /// Leaves out parts of volumes, tile by tile, that lie before or behind everything that is seen and receives (001 section
-    /// 5.3). Only with `culling`.
+    /// Draws a volume only where something is seen in it that receives (001 section 5.3). Only with `culling`.
     pub depth_bounds: bool,
     /// Volumes end behind the last surface that receives, instead of at infinity.
     pub fitted: bool,

@@ -46,8 +46,8 @@ fn common(intensity: f32, unit: &'static str) -> Vec<Field> {
             .doc("How silhouettes are found: once for all views, or by degenerate quads in each view (000 section 4.2)."),
         Field::new("volume_culling", true).doc("Leaves out shadow volumes and caps that cannot be seen."),
         Field::new("volume_depth_bounds", true).doc(
-            "With `volume_culling`, on software devices: leaves out what lies before or behind all that is seen, tile by tile (001 \
-             section 5.3).",
+            "With `volume_culling`, on software devices: draws a volume only where something is seen in it on which its shadow may \
+             fall (001 section 5.3).",
         ),
         Field::new("volume_fitted", true).doc("Shadow volumes end behind the last shape that receives, not at infinity."),
         Field::new("volume_length", f32::INFINITY).unit("m").doc("Volume shadows end this far behind what casts them."),
