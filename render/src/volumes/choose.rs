@@ -30,8 +30,8 @@ pub struct Sight {
     /// Left, right, bottom, top: unit normals inward.
     sides: [DVec4; 4],
     /// Everything behind the near plane.
-    ahead: DVec4,
-    clip_from_world: DMat4,
+    pub(super) ahead: DVec4,
+    pub(super) clip_from_world: DMat4,
     near_rectangle: [DVec4; 4],
     pub(super) eye: DVec3,
     size: [u32; 2],

@@ -154,3 +154,105 @@ fn around(a: Scissor, b: Scissor) -> Scissor {
     let to = [0, 1].map(|i| (a[i] + a[i + 2]).max(b[i] + b[i + 2]));
     [from[0], from[1], to[0] - from[0], to[1] - from[1]]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::faces::faces;
+    use super::super::{Sight, hull};
+    use super::*;
+    use glam::{Mat4, Quat, Vec3};
+    use umbriel_scene::{Aabb, Frustum, Mesh};
+
+    /// The same numbers on every machine.
+    struct Random(u64);
+
+    impl Random {
+        fn between(&mut self, low: f32, high: f32) -> f32 {
+            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            low + (high - low) * (self.0 >> 40) as f32 / (1u64 << 24) as f32
+        }
+
+        fn place(&mut self, low: f32, high: f32) -> Vec3 {
+            Vec3::from_array(std::array::from_fn(|_| self.between(low, high)))
+        }
+
+        /// A box that stands askew, its place, and its half sizes.
+        fn askew(&mut self, sizes: [f32; 2]) -> (TurnedBox, Mat4, Vec3) {
+            let [yaw, pitch] = [3.0, 1.5].map(|most| self.between(-most, most));
+            let turned = Quat::from_rotation_y(yaw) * Quat::from_rotation_x(pitch);
+            let place = Mat4::from_rotation_translation(turned, self.place(-3.0, 3.0));
+            let half = self.place(sizes[0], sizes[1]);
+            (TurnedBox::of(&Aabb { min: -half, max: half }, &place), place, half)
+        }
+    }
+
+    /// Points of a box, or of a rectangle, that the light reaches through the caster's box are in the rectangle of pixels, wherever
+    /// the eye is: inside of either box, and in the shadow.
+    #[test]
+    fn all_that_is_seen_in_a_volume_is_in_the_rectangle() {
+        let mut random = Random(3);
+        let (mut checked, mut around_the_eye) = ([0, 0], 0);
+        for round in 0..4000 {
+            let (caster, caster_place, caster_half) = random.askew([0.05, 1.5]);
+            let (receiver, place, mut half) = random.askew([0.5, 4.0]);
+            let is_face = round % 2 == 0;
+            let mut seen = Seen::default();
+            if is_face {
+                half.y = 0.0;
+                let corner = |x: f32, z: f32| Vec3::new(x * half.x, 0.0, z * half.z);
+                let mesh = Mesh {
+                    positions: vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)].into(),
+                    indices: vec![0, 1, 2, 0, 2, 3].into(),
+                    ..Mesh::default()
+                };
+                seen.faces = faces(&mesh, &place);
+            } else {
+                seen.boxes = vec![receiver];
+            }
+            let toward = if round % 3 == 0 { random.place(-1.0, 1.0).extend(0.0) } else { random.place(-6.0, 6.0).extend(1.0) };
+            let eye = match round % 4 {
+                1 => place.transform_point3(random.place(-1.0, 1.0) * half),
+                _ => random.place(-5.0, 5.0),
+            };
+            let view = View {
+                name: String::new(),
+                view_from_world: glam::camera::rh::view::look_at_mat4(eye, random.place(-2.0, 2.0), Vec3::Y),
+                frustum: Frustum::symmetric(1.0, 1.25, [0.01, 1.0][round / 2 % 2]),
+                size: [200, 160],
+            };
+            let sight = Sight::new(&view, Aabb::EMPTY);
+            let shown = Shown::new(seen, &view, sight.clip_from_world, sight.ahead);
+            let planes = planes(&caster, toward.as_dvec4(), eye.as_dvec3(), hull::margin(&caster.corners));
+            let found = shown.touched(&caster, &planes, [0, 0, 200, 160]);
+            let to_caster = caster_place.inverse();
+            for sample in 0..400 {
+                let mut p = place.transform_point3(random.place(-1.0, 1.0) * half);
+                if !is_face && sample % 2 == 0 {
+                    // Just behind the near plane, where that is in the box.
+                    let ahead = sight.ahead.truncate().as_vec3();
+                    p -= ahead * (sight.ahead.dot(p.as_dvec3().extend(1.0)) as f32 - 1e-4);
+                    if receiver.planes().any(|plane| plane.dot(p.as_dvec3().extend(1.0)) < 0.0) {
+                        continue;
+                    }
+                }
+                // From the receiver towards the light, in the caster's space.
+                let from = to_caster.transform_point3(p);
+                let along = to_caster.transform_vector3(toward.truncate() - p * toward.w);
+                let end = if toward.w == 0.0 { f32::INFINITY } else { 1.0 };
+                let ends = [(-caster_half - from) / along, (caster_half - from) / along];
+                let (enter, leave) = (ends[0].min(ends[1]).max_element().max(0.0), ends[0].max(ends[1]).min_element().min(end));
+                let clip = sight.clip_from_world * p.as_dvec3().extend(1.0);
+                let [x, y] = [clip.x / clip.w, -clip.y / clip.w].map(|ndc| ndc * 0.5 + 0.5);
+                let is_seen = clip.w > f64::from(view.frustum.near) && (0.0..1.0).contains(&x) && (0.0..1.0).contains(&y);
+                if enter + 1e-3 < leave && is_seen {
+                    let [x, y] = [(x * 200.0) as u32, (y * 160.0) as u32];
+                    let is_in = |[l, t, w, h]: Scissor| (l..l + w).contains(&x) && (t..t + h).contains(&y);
+                    assert!(found.is_some_and(is_in), "{x} {y} is not in {found:?}, round {round}");
+                    checked[usize::from(is_face)] += 1;
+                    around_the_eye += usize::from(receiver.planes().all(|plane| plane.dot(eye.as_dvec3().extend(1.0)) > 0.0));
+                }
+            }
+        }
+        assert!(checked.iter().all(|c| *c > 5000) && around_the_eye > 1000, "{checked:?}, {around_the_eye}");
+    }
+}
