@@ -195,7 +195,7 @@ pub(crate) fn plan_picture(
         stats.views += 1;
         let mut exempt_from = Exempt { scene: frame.scene, clip_from_world: &clip_from_world, known: HashMap::new() };
         // Soft shadows read their view's pixels by their place.
-        let origin = sheets.place(view.size, frame.soft.iter().any(Option::is_some), limit);
+        let origin = sheets.place(view.size, frame.scene.samples, frame.soft.iter().any(Option::is_some), limit);
         let mut uniform = uniform_of(view, rect, frame.scene);
         uniform.window = [origin[0], origin[1], view.size[0], view.size[1]].map(|x| x as f32);
         let mut slot_with = |first: usize, count: usize| {

@@ -4,10 +4,15 @@
 //! neighbours share a target of at most the pixels of one large view, and these are paid once. Mesa's software driver even
 //! waits for all that was drawn wherever a pass begins or ends.
 
-use umbriel_scene::{Layout, Picture, PictureKind};
+use umbriel_scene::{Layout, Picture, PictureKind, Samples};
 
 /// Pixels up to which views come together.
 const MOST_PIXELS: u64 = 1920 * 1080;
+
+/// Pixels, across and down, where a scissor rectangle may begin. With four samples, Mesa's software driver (llvmpipe of 25.0.7) draws into
+/// the row above a rectangle and the column before it, unless it begins with one of the driver's tiles: samples beyond the
+/// middle of the pixel, of triangles that reach into the rectangle, but not of those beside them.
+pub(crate) const SCISSOR_STEP: u32 = 64;
 
 /// A target of the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,9 +29,10 @@ pub(crate) struct Sheets(pub(crate) Vec<Sheet>);
 
 impl Sheets {
     /// Left and top of the next view in its sheet. `is_alone` gives it one of its own; `widest` is what the device takes.
-    pub(crate) fn place(&mut self, [width, height]: [u32; 2], is_alone: bool, widest: u32) -> [u32; 2] {
+    pub(crate) fn place(&mut self, [width, height]: [u32; 2], samples: Samples, is_alone: bool, widest: u32) -> [u32; 2] {
+        let step = if samples == Samples::One { 1 } else { SCISSOR_STEP };
         let last = self.0.last_mut().filter(|sheet| {
-            let wide = u64::from(sheet.size[0]) + u64::from(width);
+            let wide = u64::from(sheet.size[0].next_multiple_of(step)) + u64::from(width);
             !is_alone
                 && !sheet.is_full
                 && sheet.size[1] == height
@@ -37,8 +43,8 @@ impl Sheets {
             self.0.push(Sheet { size: [width, height], views: 1, is_full: is_alone });
             return [0, 0];
         };
-        let left = sheet.size[0];
-        sheet.size[0] += width;
+        let left = sheet.size[0].next_multiple_of(step);
+        sheet.size[0] = left + width;
         sheet.views += 1;
         [left, 0]
     }
@@ -67,7 +73,7 @@ mod tests {
         /// Name, size of each view and whether it is alone, size and views of each sheet.
         type Row = (&'static str, &'static [([u32; 2], bool)], &'static [([u32; 2], usize)]);
         let rows: [Row; 6] = [
-            ("seven channels", &[([320, 256], false); 7], &[([2240, 256], 7)]),
+            ("seven channels", &[([300, 256], false); 7], &[([2100, 256], 7)]),
             ("large ones", &[([1920, 1080], false); 2], &[([1920, 1080], 1); 2]),
             ("of two heights", &[([64, 64], false), ([64, 32], false), ([64, 32], false)], &[([64, 64], 1), ([128, 32], 2)]),
             ("one alone", &[([64, 64], false), ([64, 64], true), ([64, 64], false)], &[([64, 64], 1); 3]),
@@ -76,7 +82,7 @@ mod tests {
         ];
         for (name, views, expected) in rows {
             let mut sheets = Sheets::default();
-            let places: Vec<_> = views.iter().map(|(size, alone)| sheets.place(*size, *alone, 8192)).collect();
+            let places: Vec<_> = views.iter().map(|(size, alone)| sheets.place(*size, Samples::One, *alone, 8192)).collect();
             let found: Vec<_> = sheets.0.iter().map(|s| (s.size, s.views)).collect();
             assert_eq!(found, expected, "{name}");
             let mut next = places.into_iter().zip(views);
@@ -89,5 +95,8 @@ mod tests {
                 assert_eq!(left, sheet.size[0], "{name}");
             }
         }
+        let mut sheets = Sheets::default();
+        let lefts = [(); 3].map(|()| sheets.place([300, 256], Samples::Four, false, 8192)[0]);
+        assert_eq!((lefts, sheets.0[0].size), ([0, 320, 640], [940, 256]), "four samples");
     }
 }

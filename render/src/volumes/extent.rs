@@ -3,6 +3,7 @@
 use super::choose::{Sight, Watch};
 use super::reach::{self, Reach};
 use super::{Surface, TurnedBox, VolumeLight};
+use crate::sheets::SCISSOR_STEP;
 use umbriel_scene::Aabb;
 
 /// How far a caster's shadow may fall.
@@ -41,8 +42,10 @@ impl Sight {
         self.placed(self.whole())
     }
 
-    /// A rectangle of the view in its target.
+    /// A rectangle of the view in its target, grown to where it may begin.
     pub(super) fn placed(&self, [left, top, width, height]: [u32; 4]) -> [u32; 4] {
-        [left + self.origin[0], top + self.origin[1], width, height]
+        let begin = |at: u32, origin: u32| ((at + origin) / SCISSOR_STEP * SCISSOR_STEP).max(origin);
+        let (x, y) = (begin(left, self.origin[0]), begin(top, self.origin[1]));
+        [x, y, left + self.origin[0] + width - x, top + self.origin[1] + height - y]
     }
 }

@@ -16,7 +16,7 @@ fn cards() -> (Scene, [View; 2]) {
     (Scene { drawables: drawables.into(), ..Default::default() }, [over(-5.0), over(5.0)])
 }
 
-fn picture(views: [View; 2], size: [u32; 2], layout: Layout) -> Picture {
+fn picture<const N: usize>(views: [View; N], size: [u32; 2], layout: Layout) -> Picture {
     Picture { name: "layout".into(), size, views: views.into(), layout, kind: PictureKind::Colour }
 }
 
@@ -137,4 +137,29 @@ fn pictures_drawn_in_themselves_are_as_if_composed() {
         2,
         "samples are mixed before they are exposed"
     );
+}
+
+/// Views that share a target do not touch each other's samples, however wide they are.
+#[test]
+fn neighbours_are_as_if_alone() {
+    let box_at = |x: f32| shape(cuboid(Vec3::ONE), matt(0.8, 0.5, 0.3), at(x, 0.5, 0.0));
+    let sun = Light { direction: Vec3::new(-0.5, -1.0, -0.4).normalize(), shadows: ShadowMethod::Volume, ..noon() };
+    let scene = Scene {
+        drawables: vec![shape(plane(40.0), matt(0.6, 0.6, 0.6), at(0.0, 0.0, 0.0)), box_at(-1.5), box_at(1.5)].into(),
+        lights: vec![sun],
+        samples: Samples::Four,
+        ..Scene::default()
+    };
+    let view = |i: usize| look("one", Vec3::new(3.0 * i as f32 - 3.0, 2.0, 6.0), Vec3::new(0.0, 0.5, 0.0), [75, 48]);
+    let rects = [0, 1, 2].map(|i| Rect { x: 75 * i, y: 0, width: 75, height: 48 });
+    let all = shoot(&scene, &picture([view(0), view(1), view(2)], [225, 48], Layout::Tiles(rects.into())));
+    for i in 0..3 {
+        let alone = shoot(&scene, &picture([view(i)], [75, 48], Layout::Tiles([rects[0]].into())));
+        let row = |pixels: &[u8], left: usize, width: usize, y: usize| pixels[4 * (y * width + left)..][..4 * 75].to_vec();
+        for y in 0..48 {
+            let (one, among) = (row(&alone.layers[0].rgba, 0, 75, y), row(&all.layers[0].rgba, 75 * i, 225, y));
+            let differs = one.iter().zip(&among).position(|(a, b)| a.abs_diff(*b) > 1).map(|k| k / 4);
+            assert_eq!(differs, None, "column of view {i}, row {y}");
+        }
+    }
 }
