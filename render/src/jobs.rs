@@ -8,7 +8,7 @@ use crate::lights::{Lights, leaves_holes_to_maps};
 use crate::plan::{BLACK_FILM, Purpose};
 use crate::slots::Slots;
 use crate::stats::Problems;
-use crate::volumes::{self, Cone, Seen, Surface, TurnedBox, VolumeCaster, VolumeJob, VolumeLight};
+use crate::volumes::{self, Cone, Receiver, Seen, Surface, TurnedBox, VolumeCaster, VolumeJob, VolumeLight};
 use crate::{enclosed, uniforms};
 use glam::{Mat4, Vec3, Vec4};
 use std::sync::Arc;
@@ -155,17 +155,19 @@ pub(crate) fn seen(drawables: impl Iterator<Item = usize>, scene: &Scene, view_f
         if receives && d.bounds_in_world.is_empty() {
             return None;
         }
-        let is_small = d.mesh.topology == Topology::Triangles && d.mesh.triangle_count() <= MOST_FACES;
-        if d.pose.is_some() || !is_small {
-            seen.boxes.extend(receives.then(|| bounds_of(d, d.pose.is_some())));
-            continue;
+        let is_known = d.pose.is_none() && d.mesh.topology == Topology::Triangles && d.mesh.triangle_count() <= MOST_FACES;
+        let mut known = is_known.then(Vec::new);
+        if let Some(known) = &mut known {
+            let front = if d.world_from_object.determinant() < 0.0 { -1.0 } else { 1.0 };
+            let hides = d.material.alpha == AlphaMode::Opaque && d.material.shader.is_none();
+            for face in volumes::faces(&d.mesh, &d.world_from_object) {
+                let over = if d.material.double_sided { f64::INFINITY } else { front * face.distance_to(eye) };
+                seen.hiding.extend((hides && over > 0.0).then_some(face));
+                known.extend((over > -face.margin()).then_some(face));
+            }
         }
-        let front = if d.world_from_object.determinant() < 0.0 { -1.0 } else { 1.0 };
-        let hides = d.material.alpha == AlphaMode::Opaque && d.material.shader.is_none();
-        for face in volumes::faces(&d.mesh, &d.world_from_object) {
-            let over = if d.material.double_sided { f64::INFINITY } else { front * face.distance_to(eye) };
-            seen.hiding.extend((hides && over > 0.0).then_some(face));
-            seen.faces.extend((receives && over > -face.margin()).then_some(face));
+        if receives {
+            seen.receivers.push(Receiver { bounds: bounds_of(d, d.pose.is_some()), faces: known });
         }
     }
     Some(seen)

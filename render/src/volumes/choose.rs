@@ -202,14 +202,16 @@ impl<'a> Watch<'a> {
         }
         choice.near_caps &= !sight.is_outside(&corners, margin);
         choice.far_caps &= !sight.is_outside(&volume[8..], margin);
+        let mut lit = self.lit;
         if reach.times != f64::INFINITY {
             let swept = Aabb::from_points(volume.iter().map(|p| p.truncate().as_vec3()));
-            choice.scissor = overlap(choice.scissor, sight.pixels(&common(&swept, &self.lit))?)?;
+            lit = common(&lit, &Aabb { min: swept.min - margin as f32, max: swept.max + margin as f32 });
+            choice.scissor = overlap(choice.scissor, sight.pixels(&lit)?)?;
         }
         if self.light.settings.depth_bounds
             && let Some(shown) = &sight.shown
         {
-            choice.scissor = shown.touched(bounds, &seen::planes(bounds, toward, sight.eye, margin), choice.scissor)?;
+            choice.scissor = shown.touched(bounds, &lit, &seen::planes(bounds, toward, sight.eye, margin), choice.scissor)?;
         }
         Some(choice)
     }

@@ -36,7 +36,7 @@ pub use choose::Sight;
 pub(crate) use extent::Extent;
 pub(crate) use extract::CasterUniform;
 pub use faces::{Face, faces};
-pub use seen::Seen;
+pub use seen::{Receiver, Seen};
 pub use turned::TurnedBox;
 
 use choose::Watch;

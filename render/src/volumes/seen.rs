@@ -10,17 +10,24 @@ use super::tiles::{Sought, Tiles};
 use super::{TurnedBox, hull};
 use glam::{DMat4, DVec3, DVec4};
 use std::cell::OnceCell;
-use umbriel_scene::View;
+use umbriel_scene::{Aabb, View};
 
 /// What is seen of a scene in a view, as far as shadows are concerned.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
-    /// Faces that shadows may fall on, and boxes in which they may fall on something.
-    pub faces: Vec<Face>,
-    /// As `faces`.
-    pub boxes: Vec<TurnedBox>,
+    /// What shadows may fall on.
+    pub receivers: Vec<Receiver>,
     /// Faces in the depth buffer that hide what is behind them.
     pub hiding: Vec<Face>,
+}
+
+/// Something that shadows may fall on.
+#[derive(Clone, Debug)]
+pub struct Receiver {
+    /// Box around it.
+    pub bounds: TurnedBox,
+    /// Its faces, as far as they may be seen; `None` where they are not known and shadows may fall on anything in the box.
+    pub faces: Option<Vec<Face>>,
 }
 
 /// The same, ready to be asked.
@@ -70,19 +77,28 @@ impl Shown {
         Shown { seen, view: view.clone(), clip_from_world, ahead, tiles: OnceCell::new() }
     }
 
-    /// The smallest rectangle of pixels found, inside of `within`, outside of which nothing is seen in the volume of a box.
-    pub(super) fn touched(&self, bounds: &TurnedBox, planes: &[DVec4], within: Scissor) -> Option<Scissor> {
+    /// The smallest rectangle of pixels found, inside of `within`, outside of which nothing is seen in the volume of a box. `swept` is a
+    /// box along the axes of the world around the volume.
+    pub(super) fn touched(&self, bounds: &TurnedBox, swept: &Aabb, planes: &[DVec4], within: Scissor) -> Option<Scissor> {
         let (mut polygon, mut spare) = (Vec::with_capacity(16), Vec::with_capacity(16));
         let mut found: Option<Scissor> = None;
-        for face in self.seen.faces.iter().filter(|face| !are_outside(face.corners(), planes)) {
-            polygon.clear();
-            polygon.extend_from_slice(face.corners());
-            planes.iter().chain([&self.ahead]).for_each(|plane| clip(&mut polygon, &mut spare, *plane));
-            self.take(&mut found, &polygon, within, (Some(face), planes));
-        }
-        for b in &self.seen.boxes {
+        let is_near = |b: &Aabb| b.min.cmple(swept.max).all() && b.max.cmpge(swept.min).all();
+        for receiver in self.seen.receivers.iter().filter(|r| is_near(&r.bounds.in_world)) {
+            if found == Some(within) {
+                break;
+            }
+            let b = &receiver.bounds;
             let corners = b.corners.map(DVec4::truncate);
             if are_outside(&corners, planes) {
+                continue;
+            }
+            if let Some(faces) = &receiver.faces {
+                for face in faces.iter().filter(|face| !are_outside(face.corners(), planes)) {
+                    polygon.clear();
+                    polygon.extend_from_slice(face.corners());
+                    planes.iter().chain([&self.ahead]).for_each(|plane| clip(&mut polygon, &mut spare, *plane));
+                    self.take(&mut found, &polygon, within, (Some(face), planes));
+                }
                 continue;
             }
             // The corners of what is in both and in the view: a corner of one that the others hold, or where sides meet.
@@ -161,7 +177,7 @@ mod tests {
     use super::super::{Sight, hull};
     use super::*;
     use glam::{Mat4, Quat, Vec3};
-    use umbriel_scene::{Aabb, Frustum, Mesh};
+    use umbriel_scene::{Frustum, Mesh};
 
     /// The same numbers on every machine.
     struct Random(u64);
@@ -196,7 +212,7 @@ mod tests {
             let (caster, caster_place, caster_half) = random.askew([0.05, 1.5]);
             let (receiver, place, mut half) = random.askew([0.5, 4.0]);
             let is_face = round % 2 == 0;
-            let mut seen = Seen::default();
+            let mut known = None;
             if is_face {
                 half.y = 0.0;
                 let corner = |x: f32, z: f32| Vec3::new(x * half.x, 0.0, z * half.z);
@@ -205,10 +221,9 @@ mod tests {
                     indices: vec![0, 1, 2, 0, 2, 3].into(),
                     ..Mesh::default()
                 };
-                seen.faces = faces(&mesh, &place);
-            } else {
-                seen.boxes = vec![receiver];
+                known = Some(faces(&mesh, &place));
             }
+            let seen = Seen { receivers: vec![Receiver { bounds: receiver, faces: known }], ..Seen::default() };
             let toward = if round % 3 == 0 { random.place(-1.0, 1.0).extend(0.0) } else { random.place(-6.0, 6.0).extend(1.0) };
             let eye = match round % 4 {
                 1 => place.transform_point3(random.place(-1.0, 1.0) * half),
@@ -223,7 +238,8 @@ mod tests {
             let sight = Sight::new(&view, Aabb::EMPTY);
             let shown = Shown::new(seen, &view, sight.clip_from_world, sight.ahead);
             let planes = planes(&caster, toward.as_dvec4(), eye.as_dvec3(), hull::margin(&caster.corners));
-            let found = shown.touched(&caster, &planes, [0, 0, 200, 160]);
+            let everything = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
+            let found = shown.touched(&caster, &everything, &planes, [0, 0, 200, 160]);
             let to_caster = caster_place.inverse();
             for sample in 0..400 {
                 let mut p = place.transform_point3(random.place(-1.0, 1.0) * half);

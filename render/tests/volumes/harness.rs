@@ -3,7 +3,8 @@
 use crate::shapes::Thing;
 use glam::{Mat4, Vec4};
 use umbriel_render::volumes::{
-    Depth, Seen, Sight, Surface, TurnedBox, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats, faces,
+    Depth, Receiver, Seen, Sight, Surface, TurnedBox, VolumeCaster, VolumeDraws, VolumeJob, VolumeLight, VolumePass, VolumeStats,
+    faces,
 };
 use umbriel_scene::{Aabb, View, VolumeSettings};
 use wgpu::util::DeviceExt;
@@ -183,12 +184,13 @@ impl Gpu {
         let mut sight = Sight::new(view, receives);
         if !receives.is_empty() {
             // Surfaces are drawn from both sides. Every fourth is known by its box.
-            let things = || casters.iter().chain(receivers).enumerate();
-            let all = things().flat_map(|(_, l)| faces(&l.thing.mesh, &l.thing.world_from_object)).collect();
-            let known = things().filter(|(i, _)| i % 4 != 3);
-            let boxes = things().filter(|(i, _)| i % 4 == 3).map(|(_, l)| l.caster().bounds).collect();
-            let faces = known.flat_map(|(_, l)| faces(&l.thing.mesh, &l.thing.world_from_object)).collect();
-            sight = sight.with(Seen { faces, boxes, hiding: all });
+            let mut seen = Seen::default();
+            for (i, l) in casters.iter().chain(receivers).enumerate() {
+                let faces = faces(&l.thing.mesh, &l.thing.world_from_object);
+                seen.hiding.extend_from_slice(&faces);
+                seen.receivers.push(Receiver { bounds: l.caster().bounds, faces: (i % 4 != 3).then_some(faces) });
+            }
+            sight = sight.with(seen);
         }
         let stats = self.pass.prepare(&self.device, &mut encoder, &[job]);
         self.surfaces(&mut encoder, casters.iter().chain(receivers), &view_group, &target_view);
