@@ -10,7 +10,7 @@ use super::{Guest, Whose, Wish};
 use crate::cluster::message::{GuestMessage, GuestRequest, bytes_of};
 
 impl Guest {
-    /// A graph of the world, and whose its nodes are; after [`News::Begins`]. What is done to it from then on is told.
+    /// A graph of the world, and whose its nodes are; after [`News::Begins`](super::News::Begins). What is done to it from then on is told.
     pub fn enter(&mut self) -> (Graph, Whose) {
         let (mut graph, mut whose) = (std::mem::replace(&mut self.graph, (self.fresh)()), Whose::default());
         self.mirror = Some(Mirror::of(&mut graph));
