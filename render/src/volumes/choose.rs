@@ -34,12 +34,11 @@ pub struct Sight {
     pub(super) clip_from_world: DMat4,
     near_rectangle: [DVec4; 4],
     pub(super) eye: DVec3,
-    size: [u32; 2],
     /// Left and top of the view in its target.
     pub(super) origin: [u32; 2],
     receivers: Aabb,
-    view: View,
-    shown: Option<Shown>,
+    pub(super) view: View,
+    pub(super) shown: Option<Shown>,
 }
 
 /// A rectangle of pixels: left, top, width, height.
@@ -86,7 +85,6 @@ impl Sight {
             near_rectangle: [(f.left, f.bottom), (f.right, f.bottom), (f.right, f.top), (f.left, f.top)]
                 .map(|(x, y)| near_corner(x, y)),
             eye: world_from_view.w_axis.truncate(),
-            size: view.size,
             origin: [0, 0],
             receivers,
             view: view.clone(),
@@ -96,8 +94,7 @@ impl Sight {
 
     /// The same with what is known of surfaces in it: all that shadows may fall on, or else these go without a shadow.
     pub fn with(self, seen: Seen) -> Sight {
-        let shown = Shown::new(seen, &self.view, self.clip_from_world, self.ahead);
-        Sight { shown: Some(shown), ..self }
+        Sight { shown: Some(Shown::new(seen)), ..self }
     }
 
     /// The same in a target where the view begins at this pixel.
@@ -106,7 +103,7 @@ impl Sight {
     }
 
     pub(super) fn whole(&self) -> Scissor {
-        [0, 0, self.size[0], self.size[1]]
+        [0, 0, self.view.size[0], self.view.size[1]]
     }
 
     /// Is all of a hull outside of the frustum? Beyond a far plane is nothing.
@@ -120,25 +117,30 @@ impl Sight {
         let inside = |p: &DVec4| self.ahead.dot(*p);
         let mut points: Vec<DVec4> = corners.iter().filter(|c| inside(c) >= 0.0).copied().collect();
         // Where edges of the box pass the near plane.
-        for (i, bit) in (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, bit))).filter(|(i, bit)| i & bit == 0) {
-            let (a, b) = (corners[i], corners[i | bit]);
+        for (i, j) in hull::edges() {
+            let (a, b) = (corners[i], corners[j]);
             let (over_a, over_b) = (inside(&a), inside(&b));
             if (over_a < 0.0) != (over_b < 0.0) {
                 points.push(a + (b - a) * (over_a / (over_a - over_b)));
             }
         }
+        self.pixels_around(points.into_iter().map(|p| self.clip_from_world * p))
+    }
+
+    /// The pixels of the view around places in clip space, all before the eye; `None` for none.
+    pub(super) fn pixels_around(&self, places: impl Iterator<Item = DVec4>) -> Option<Scissor> {
+        let size = self.view.size;
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for p in points {
-            let clip = self.clip_from_world * p;
+        for clip in places {
             let ndc = [clip.x / clip.w, -clip.y / clip.w];
             for i in 0..2 {
-                let pixel = (ndc[i] * 0.5 + 0.5) * f64::from(self.size[i]);
+                let pixel = (ndc[i] * 0.5 + 0.5) * f64::from(size[i]);
                 (low[i], high[i]) = (low[i].min(pixel), high[i].max(pixel));
             }
         }
         // Conversion from float to integer ends at the borders of the integer.
-        let from = [0, 1].map(|i| ((low[i] - 1.0).floor() as u32).min(self.size[i]));
-        let to = [0, 1].map(|i| ((high[i] + 1.0).ceil() as u32).min(self.size[i]));
+        let from = [0, 1].map(|i| ((low[i] - 1.0).floor() as u32).min(size[i]));
+        let to = [0, 1].map(|i| ((high[i] + 1.0).ceil() as u32).min(size[i]));
         (to[0] > from[0] && to[1] > from[1]).then(|| [from[0], from[1], to[0] - from[0], to[1] - from[1]])
     }
 }
@@ -211,7 +213,8 @@ impl<'a> Watch<'a> {
         if self.light.settings.depth_bounds
             && let Some(shown) = &sight.shown
         {
-            choice.scissor = shown.touched(bounds, &lit, &seen::planes(bounds, toward, sight.eye, margin), choice.scissor)?;
+            let planes = seen::planes(bounds, toward, sight.eye, margin);
+            choice.scissor = shown.touched(sight, bounds, &lit, &planes, choice.scissor)?;
         }
         Some(choice)
     }
@@ -221,7 +224,7 @@ fn common(a: &Aabb, b: &Aabb) -> Aabb {
     Aabb { min: a.min.max(b.min), max: a.max.min(b.max) }
 }
 
-fn overlap(a: Scissor, b: Scissor) -> Option<Scissor> {
+pub(super) fn overlap(a: Scissor, b: Scissor) -> Option<Scissor> {
     let from = [0, 1].map(|i| a[i].max(b[i]));
     let to = [0, 1].map(|i| (a[i] + a[i + 2]).min(b[i] + b[i + 2]));
     (to[0] > from[0] && to[1] > from[1]).then(|| [from[0], from[1], to[0] - from[0], to[1] - from[1]])

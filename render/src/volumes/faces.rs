@@ -80,11 +80,10 @@ pub fn faces(mesh: &Mesh, world_from_object: &Mat4) -> Vec<Face> {
 
 /// What of a convex polygon is on the inner side of a plane (unit normal inward), in place. `spare` is overwritten.
 pub(super) fn clip(polygon: &mut Vec<DVec3>, spare: &mut Vec<DVec3>, plane: DVec4) {
-    let height = |p: DVec3| plane.dot(p.extend(1.0));
     spare.clear();
     for (i, &p) in polygon.iter().enumerate() {
         let next = polygon[(i + 1) % polygon.len()];
-        let (here, there) = (height(p), height(next));
+        let (here, there) = (hull::height(&plane, p), hull::height(&plane, next));
         if here >= 0.0 {
             spare.push(p);
         }

@@ -46,6 +46,16 @@ pub(super) fn is_behind(points: &[DVec4], plane: DVec4, margin: f64) -> bool {
     points.iter().all(|p| plane.dot(*p) < if p.w == 0.0 { -1e-6 * p.truncate().length() } else { -margin })
 }
 
+/// The edges of a box, by the places of their ends among its corners.
+pub(super) fn edges() -> impl Iterator<Item = (usize, usize)> {
+    (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, i | bit))).filter(|(i, j)| i != j)
+}
+
+/// How far a point is on the inner side of a plane (unit normal inward).
+pub(super) fn height(plane: &DVec4, p: DVec3) -> f64 {
+    plane.dot(p.extend(1.0))
+}
+
 /// The six planes around a box, normals inward.
 pub(super) fn planes(b: &Aabb) -> [DVec4; 6] {
     let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());

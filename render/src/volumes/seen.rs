@@ -4,13 +4,13 @@
 //!
 //! Outside of that a volume changes nothing that is seen: over all of these pixels it counts to 0, whichever way it is counted.
 
-use super::choose::Scissor;
+use super::choose::{Scissor, Sight, overlap};
 use super::faces::{Face, clip};
 use super::tiles::{Sought, Tiles};
 use super::{TurnedBox, hull};
-use glam::{DMat4, DVec3, DVec4};
+use glam::{DVec3, DVec4};
 use std::cell::OnceCell;
-use umbriel_scene::{Aabb, View};
+use umbriel_scene::Aabb;
 
 /// What is seen of a scene in a view, as far as shadows are concerned.
 #[derive(Clone, Debug, Default)]
@@ -33,10 +33,6 @@ pub struct Receiver {
 /// The same, ready to be asked.
 pub(super) struct Shown {
     seen: Seen,
-    view: View,
-    clip_from_world: DMat4,
-    /// Everything behind the near plane.
-    ahead: DVec4,
     /// Made when they are first asked.
     tiles: OnceCell<Tiles>,
 }
@@ -54,9 +50,9 @@ pub(super) fn planes(bounds: &TurnedBox, toward: DVec4, eye: DVec3, margin: f64)
             planes.push((-normal).extend(if normal.dot(eye) > top { top - rounding } else { top + margin }));
         }
     }
-    for (i, bit) in (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, bit))).filter(|(i, bit)| i & bit == 0) {
+    for (i, j) in hull::edges() {
         let along = toward.truncate() - corners[i] * toward.w;
-        let Some(normal) = (corners[i | bit] - corners[i]).cross(along).try_normalize() else { continue };
+        let Some(normal) = (corners[j] - corners[i]).cross(along).try_normalize() else { continue };
         for normal in [normal, -normal] {
             let top = top(normal);
             if top <= normal.dot(corners[i]) + 1e-2 * rounding {
@@ -69,17 +65,24 @@ pub(super) fn planes(bounds: &TurnedBox, toward: DVec4, eye: DVec3, margin: f64)
 
 /// Are all points outside of one of the planes?
 fn are_outside(points: &[DVec3], planes: &[DVec4]) -> bool {
-    planes.iter().any(|plane| points.iter().all(|p| plane.dot(p.extend(1.0)) < 0.0))
+    planes.iter().any(|plane| points.iter().all(|p| hull::height(plane, *p) < 0.0))
 }
 
 impl Shown {
-    pub(super) fn new(seen: Seen, view: &View, clip_from_world: DMat4, ahead: DVec4) -> Shown {
-        Shown { seen, view: view.clone(), clip_from_world, ahead, tiles: OnceCell::new() }
+    pub(super) fn new(seen: Seen) -> Shown {
+        Shown { seen, tiles: OnceCell::new() }
     }
 
     /// The smallest rectangle of pixels found, inside of `within`, outside of which nothing is seen in the volume of a box. `swept` is a
     /// box along the axes of the world around the volume.
-    pub(super) fn touched(&self, bounds: &TurnedBox, swept: &Aabb, planes: &[DVec4], within: Scissor) -> Option<Scissor> {
+    pub(super) fn touched(
+        &self,
+        sight: &Sight,
+        bounds: &TurnedBox,
+        swept: &Aabb,
+        planes: &[DVec4],
+        within: Scissor,
+    ) -> Option<Scissor> {
         let (mut polygon, mut spare) = (Vec::with_capacity(16), Vec::with_capacity(16));
         let mut found: Option<Scissor> = None;
         let is_near = |b: &Aabb| b.min.cmple(swept.max).all() && b.max.cmpge(swept.min).all();
@@ -96,15 +99,15 @@ impl Shown {
                 for face in faces.iter().filter(|face| !are_outside(face.corners(), planes)) {
                     polygon.clear();
                     polygon.extend_from_slice(face.corners());
-                    planes.iter().chain([&self.ahead]).for_each(|plane| clip(&mut polygon, &mut spare, *plane));
-                    self.take(&mut found, &polygon, within, (Some(face), planes));
+                    planes.iter().chain([&sight.ahead]).for_each(|plane| clip(&mut polygon, &mut spare, *plane));
+                    self.take(&mut found, (sight, &polygon, Some(face)), planes, within);
                 }
                 continue;
             }
             // The corners of what is in both and in the view: a corner of one that the others hold, or where sides meet.
             let around: Vec<DVec4> = b.planes().collect();
             let held = bounds.corners.iter().map(|c| c.truncate());
-            let is_held = |p: &DVec3| around.iter().chain([&self.ahead]).all(|plane| plane.dot(p.extend(1.0)) >= 0.0);
+            let is_held = |p: &DVec3| around.iter().chain([&sight.ahead]).all(|plane| hull::height(plane, *p) >= 0.0);
             let mut points: Vec<DVec3> = held.filter(is_held).collect();
             let mut add = |side: [DVec3; 4], others: &[DVec4]| {
                 polygon.clear();
@@ -113,52 +116,44 @@ impl Shown {
                 points.extend_from_slice(&polygon);
             };
             for side in SIDES {
-                add(side.map(|i| corners[i]), &[self.ahead]);
+                add(side.map(|i| corners[i]), &[sight.ahead]);
             }
-            if corners.iter().any(|c| self.ahead.dot(c.extend(1.0)) < 0.0) {
-                add(self.near_square(&corners), &around);
+            if corners.iter().any(|c| hull::height(&sight.ahead, *c) < 0.0) {
+                add(near_square(&sight.ahead, &corners), &around);
             }
-            self.take(&mut found, &points, within, (None, planes));
+            self.take(&mut found, (sight, &points, None), planes, within);
         }
         found
     }
 
-    /// A square in the near plane, large enough for all that is there of a box.
-    fn near_square(&self, corners: &[DVec3; 8]) -> [DVec3; 4] {
-        let ahead = self.ahead.truncate();
-        let middle = corners[0] - ahead * self.ahead.dot(corners[0].extend(1.0));
-        let size = 2.0 * corners.iter().map(|c| c.distance(corners[0])).fold(0.0, f64::max);
-        let (right, up) = ahead.any_orthonormal_pair();
-        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| middle + (right * x + up * y) * size)
-    }
-
     /// Adds the pixels around points, of one face or somewhere, where they may be seen.
-    fn take(&self, found: &mut Option<Scissor>, points: &[DVec3], within: Scissor, (of, planes): (Option<&Face>, &[DVec4])) {
-        let (mut low, mut high, mut depth) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], f64::INFINITY);
-        for p in points {
-            let clip = self.clip_from_world * p.extend(1.0);
-            depth = depth.min(clip.w);
-            for (i, ndc) in [clip.x / clip.w, -clip.y / clip.w].into_iter().enumerate() {
-                let pixel = (ndc * 0.5 + 0.5) * f64::from(self.view.size[i]);
-                (low[i], high[i]) = (low[i].min(pixel), high[i].max(pixel));
-            }
-        }
-        // Conversion from float to integer ends at the borders of the integer.
-        let from = [0, 1].map(|i| ((low[i] - 1.0).floor() as u32).max(within[i]));
-        let to = [0, 1].map(|i| ((high[i] + 1.0).ceil() as u32).min(within[i] + within[i + 2]));
-        if to[0] <= from[0] || to[1] <= from[1] {
+    fn take(
+        &self,
+        found: &mut Option<Scissor>,
+        (sight, points, of): (&Sight, &[DVec3], Option<&Face>),
+        planes: &[DVec4],
+        within: Scissor,
+    ) {
+        let places = || points.iter().map(|p| sight.clip_from_world * p.extend(1.0));
+        let Some(here) = sight.pixels_around(places()).and_then(|pixels| overlap(pixels, within)) else { return };
+        if found.is_some_and(|before| around(before, here) == before) {
             return;
         }
-        let is_inside = |[l, t, w, h]: Scissor| l <= from[0] && t <= from[1] && to[0] <= l + w && to[1] <= t + h;
-        if found.is_some_and(is_inside) {
-            return;
-        }
-        let tiles = self.tiles.get_or_init(|| Tiles::new(&self.view, &self.seen.hiding));
-        let here = [from[0], from[1], to[0] - from[0], to[1] - from[1]];
-        if let Some(here) = tiles.seen(here, of.map_or(Sought::Beyond(depth), Sought::On), planes) {
+        let nearest = || Sought::Beyond(places().map(|clip| clip.w).fold(f64::INFINITY, f64::min));
+        let tiles = self.tiles.get_or_init(|| Tiles::new(&sight.view, &self.seen.hiding));
+        if let Some(here) = tiles.seen(here, of.map_or_else(nearest, Sought::On), planes) {
             *found = Some(found.map_or(here, |before| around(before, here)));
         }
     }
+}
+
+/// A square in the near plane, large enough for all that is there of a box. `ahead` is everything behind that plane.
+fn near_square(ahead: &DVec4, corners: &[DVec3; 8]) -> [DVec3; 4] {
+    let normal = ahead.truncate();
+    let middle = corners[0] - normal * hull::height(ahead, corners[0]);
+    let size = 2.0 * corners.iter().map(|c| c.distance(corners[0])).fold(0.0, f64::max);
+    let (right, up) = normal.any_orthonormal_pair();
+    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| middle + (right * x + up * y) * size)
 }
 
 /// Corners of the sides of a box, in order around each.
@@ -174,10 +169,9 @@ fn around(a: Scissor, b: Scissor) -> Scissor {
 #[cfg(test)]
 mod tests {
     use super::super::faces::faces;
-    use super::super::{Sight, hull};
     use super::*;
     use glam::{Mat4, Quat, Vec3};
-    use umbriel_scene::{Frustum, Mesh};
+    use umbriel_scene::{Frustum, Mesh, View};
 
     /// The same numbers on every machine.
     struct Random(u64);
@@ -236,10 +230,10 @@ mod tests {
                 size: [200, 160],
             };
             let sight = Sight::new(&view, Aabb::EMPTY);
-            let shown = Shown::new(seen, &view, sight.clip_from_world, sight.ahead);
+            let shown = Shown::new(seen);
             let planes = planes(&caster, toward.as_dvec4(), eye.as_dvec3(), hull::margin(&caster.corners));
             let everything = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
-            let found = shown.touched(&caster, &everything, &planes, [0, 0, 200, 160]);
+            let found = shown.touched(&sight, &caster, &everything, &planes, [0, 0, 200, 160]);
             let to_caster = caster_place.inverse();
             for sample in 0..400 {
                 let mut p = place.transform_point3(random.place(-1.0, 1.0) * half);

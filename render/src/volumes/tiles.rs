@@ -2,7 +2,8 @@
 //! no frame waits.
 
 use super::faces::Face;
-use glam::{DMat4, DVec3, DVec4};
+use super::hull;
+use glam::{DVec3, DVec4};
 use umbriel_scene::View;
 
 /// Pixels of a tile's side, at least.
@@ -117,12 +118,11 @@ impl Tiles {
             .map(|rays| Tile { rays, covers: Vec::new() })
             .collect();
         for face in hiding {
-            let hiding = Hiding::new(face, &view_from_world);
-            let [left, right, top, bottom] = grid.around(&hiding.corners);
+            let corners: Vec<DVec3> = face.corners().iter().map(|p| view_from_world.transform_point3(*p)).collect();
+            let sides = sides(face, eye);
+            let [left, right, top, bottom] = grid.around(&corners);
             for (x, y) in (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y))) {
-                if let Some(depths) = hiding.beyond(&grid.rays(x, y), grid.near) {
-                    tiles[(y * grid.across + x) as usize].cover(depths, eye);
-                }
+                tiles[(y * grid.across + x) as usize].hide_behind(face, &sides, eye, grid.near);
             }
         }
         Tiles { eye, side: grid.side, across: grid.across, tiles }
@@ -151,12 +151,18 @@ impl Tiles {
 }
 
 impl Tile {
-    /// A face more covers it, in these depths along its rays.
-    fn cover(&mut self, depths: [f64; 4], eye: DVec3) {
-        let ends = std::array::from_fn(|i| eye + self.rays[i] * depths[i]);
-        // Rounding, of the device as well.
-        let nearness = depths.map(|depth| 1.0 / (depth + 1e-3 + 1e-4 * depth));
-        self.covers.push(Cover { ends, nearness });
+    /// Adds a face where it covers the tile. `sides` are of [`sides`].
+    fn hide_behind(&mut self, face: &Face, sides: &[DVec3], eye: DVec3, near: f64) {
+        let depths = self.rays.map(|ray| 1.0 / face.nearness(eye, ray));
+        // What is in front of the near plane is not drawn.
+        let is_drawn = |depth: &f64| *depth > near * (1.0 + 1e-6) && depth.is_finite();
+        let is_inside = |ray: &DVec3| sides.iter().all(|side| side.dot(*ray) > 0.0);
+        if depths.iter().all(is_drawn) && self.rays.iter().all(is_inside) {
+            let ends = std::array::from_fn(|i| eye + self.rays[i] * depths[i]);
+            // Rounding, of the device as well.
+            let nearness = depths.map(|depth| 1.0 / (depth + 1e-3 + 1e-4 * depth));
+            self.covers.push(Cover { ends, nearness });
+        }
     }
 
     /// Is what is sought behind a face that covers the tile, wherever it is in it?
@@ -170,43 +176,16 @@ impl Tile {
 
     /// Is all that is seen in it outside of a plane? It lies between the eye and a face that covers the tile.
     fn is_before_one_of(&self, planes: &[DVec4], eye: DVec3) -> bool {
-        let is_outside = |plane: &DVec4, p: DVec3| plane.dot(p.extend(1.0)) < 0.0;
+        let is_outside = |plane: &DVec4, p: DVec3| hull::height(plane, p) < 0.0;
         let mut outside_of = planes.iter().filter(|plane| is_outside(plane, eye));
         outside_of.any(|plane| self.covers.iter().any(|cover| cover.ends.iter().all(|end| is_outside(plane, *end))))
     }
 }
 
-/// A face that may hide what is behind it, in the view.
-struct Hiding {
-    corners: Vec<DVec3>,
-    normal: DVec3,
-    /// How far its plane is from the eye, times the length of the normal.
-    over: f64,
-    /// Planes through the eye and its sides; what is in all of them is seen through the face.
-    sides: Vec<DVec3>,
-}
-
-impl Hiding {
-    fn new(face: &Face, view_from_world: &DMat4) -> Hiding {
-        let corners: Vec<DVec3> = face.corners().iter().map(|p| view_from_world.transform_point3(*p)).collect();
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        let over = normal.dot(corners[0]);
-        let next = corners.iter().cycle().skip(1);
-        let sides = corners.iter().zip(next).map(|(from, to)| from.cross(*to) * over.signum()).collect();
-        Hiding { corners, normal, over, sides }
-    }
-
-    /// Depths along the edges of a tile beyond which it hides everything there; none where it does not cover the tile.
-    fn beyond(&self, rays: &[DVec3; 4], near: f64) -> Option<[f64; 4]> {
-        let mut depths = [0.0; 4];
-        for (ray, depth) in rays.iter().zip(&mut depths) {
-            *depth = self.over / self.normal.dot(*ray);
-            // What is in front of the near plane is not drawn.
-            let is_drawn = *depth > near * (1.0 + 1e-6) && depth.is_finite();
-            if !is_drawn || self.sides.iter().any(|side| side.dot(*ray) <= 0.0) {
-                return None;
-            }
-        }
-        Some(depths)
-    }
+/// Planes through the eye and the sides of a face; rays that are inside of all of them pass through it.
+fn sides(face: &Face, eye: DVec3) -> Vec<DVec3> {
+    let corners = face.corners();
+    let turn = -face.distance_to(eye).signum();
+    let next = corners.iter().cycle().skip(1);
+    corners.iter().zip(next).map(|(from, to)| (*from - eye).cross(*to - eye) * turn).collect()
 }
