@@ -220,7 +220,7 @@ const TO_AN_APPLICATION: &[Said] = &[
     (|s| drop(s.asks("umbriel/snapshot", vec![255; 3]).unwrap_err()), "a display is refused: a message is damaged: "),
     (
         |s| drop(s.joins(4, "old").unwrap_err()),
-        "a display at HERE is refused: it speaks version 4 of the protocol, the application speaks 6 (display `old`)",
+        "a display at HERE is refused: it speaks version 4 of the protocol, the application speaks 7 (display `old`)",
     ),
     (|s| drop(s.joins(6, "wall").unwrap_err()), "a display at HERE is refused: there is a display `wall` already"),
     (|s| drop(s.asks("umbriel/guests/snapshot", vec![255; 3]).unwrap_err()), "an application is refused: a message is damaged: "),

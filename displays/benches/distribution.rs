@@ -143,15 +143,14 @@ fn bare(display_count: usize, frames: usize) -> Result<(), Failure> {
         streams.push(stream);
     }
     let (mut floats, mut bytes, mut wrong) = (vec![0.0f32; BARE_FLOATS], Vec::with_capacity(4 * BARE_FLOATS), 0);
-    let mut hash = None;
+    let (mut hash, poses) = (None, Poses::new());
     let started = Instant::now();
     for frame in 0..=frames {
         let [translations, rotations, scales] = [0..3, 3..7, 7..10].map(|part| part.start * TRANSFORMS..part.end * TRANSFORMS);
-        for number in 0..TRANSFORMS {
-            let x = (frame * 31 + number) as f32 * 0.001;
-            floats[translations.clone()].as_chunks_mut().0[number] = [x, 1.0, -x];
-            floats[rotations.clone()].as_chunks_mut().0[number] = Quat::from_rotation_y(x).to_array();
-            floats[scales.clone()].as_chunks_mut().0[number] = [1.0 + x; 3];
+        for (number, (translation, rotation, scale)) in poses.of(frame).iter().enumerate() {
+            floats[translations.clone()].as_chunks_mut().0[number] = translation.to_array();
+            floats[rotations.clone()].as_chunks_mut().0[number] = rotation.to_array();
+            floats[scales.clone()].as_chunks_mut().0[number] = scale.to_array();
         }
         bytes.clear();
         bytes.extend(floats.iter().flat_map(|float| float.to_le_bytes()));
@@ -187,13 +186,28 @@ fn bare(_: usize, _: usize) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Where things are, made before anything is measured: sines and cosines are the world's work.
+struct Poses(Vec<(Vec3, Quat, Vec3)>);
+
+impl Poses {
+    fn new() -> Poses {
+        let pose = |x: f32| (Vec3::new(x, 1.0, -x), Quat::from_rotation_y(x), Vec3::splat(1.0 + x));
+        Poses((0..2 * TRANSFORMS).map(|number| pose(number as f32 * 0.001)).collect())
+    }
+
+    /// One for each transform, others in each frame.
+    fn of(&self, frame: usize) -> &[(Vec3, Quat, Vec3)] {
+        let start = frame * 31 % TRANSFORMS;
+        &self.0[start..start + TRANSFORMS]
+    }
+}
+
 /// Writes so many transforms.
-fn write(graph: &mut Graph, fields: &[[FieldId; FIELDS]], frame: usize) -> Result<(), Failure> {
-    for (number, [translation, rotation, scale]) in fields.iter().enumerate() {
-        let x = (frame * 31 + number) as f32 * 0.001;
-        graph.set(*translation, Vec3::new(x, 1.0, -x))?;
-        graph.set(*rotation, Quat::from_rotation_y(x))?;
-        graph.set(*scale, Vec3::splat(1.0 + x))?;
+fn write(graph: &mut Graph, fields: &[[FieldId; FIELDS]], poses: &[(Vec3, Quat, Vec3)]) -> Result<(), Failure> {
+    for ([translation, rotation, scale], pose) in fields.iter().zip(poses) {
+        graph.set(*translation, pose.0)?;
+        graph.set(*rotation, pose.1)?;
+        graph.set(*scale, pose.2)?;
     }
     Ok(())
 }
@@ -218,10 +232,11 @@ fn parts() -> Result<(), Failure> {
     let types: Vec<NodeType> = node_types().into_iter().chain(builtin_types()).collect();
     let bulk = Bulk::new();
     let mut replica = Replica::new(&Packet::read(&snapshot)?, TypeRegistry::from(types), &bulk)?;
+    let poses = Poses::new();
     let mut took_us = [const { Vec::new() }; 4];
     for frame in 0..FRAMES {
         let begun = Instant::now();
-        write(&mut graph, &fields, frame)?;
+        write(&mut graph, &fields, poses.of(frame))?;
         let written = Instant::now();
         let bytes = publisher.frame(&graph);
         let made = Instant::now();
@@ -280,12 +295,12 @@ fn cluster(display_count: usize, uses_memory: bool, frames: usize, rows: &[(&str
     while host.in_time() < display_count {
         host.wait_until(&graph, Instant::now() + Duration::from_millis(10));
     }
-    let mut bytes_of_frame = 0;
+    let (mut bytes_of_frame, poses) = (0, Poses::new());
     for (label, count, period) in rows {
         let before = host.report();
         let started = Instant::now();
         for frame in 0..frames {
-            write(&mut graph, &fields[..*count], frame)?;
+            write(&mut graph, &fields[..*count], poses.of(frame))?;
             host.frame(&graph, false);
             if !period.is_zero() {
                 host.wait_until(&graph, started + *period * (frame as u32 + 1));

@@ -52,18 +52,21 @@ impl Graph {
     }
 
     /// Writes a field. A value of another type is converted where [`crate::converts`] allows it; an enum takes its names and numbers too.
+    // Where the type is known to the compiler one arm is left, and the value stays in registers: floats that lie on the stack one by one
+    // are read together only after a stall.
     #[inline(always)]
     pub fn set(&mut self, field: FieldId, value: impl Into<Value>) -> Result<(), Error> {
-        let value = value.into();
-        match self.write_plain(field, &value) {
-            Some(written) => {
-                if written {
-                    self.wrote(field);
-                }
-                Ok(())
+        macro_rules! one_by_one { ($($kind:ident)*) => {
+            match value.into() {
+                $(value @ Value::$kind(plain) => {
+                    // It has nothing to drop, which the compiler does not see.
+                    std::mem::forget(value);
+                    self.set_plain(field, plain)
+                })*
+                value => self.set_value(field, value),
             }
-            None => self.set_value(field, value),
-        }
+        } }
+        one_by_one! { Bool I32 I64 F32 F64 Vec2 Vec3 Vec4 Quat Rotation Mat4 Color ColorA Time Node }
     }
 
     /// Writes a field by its name.
@@ -94,24 +97,22 @@ impl Graph {
         self.explain_write(field);
     }
 
-    /// Writes without asking for a turn, as nearly all writes are: to a declared field, whose type the value has, with nothing to be
-    /// checked. Says whether anything was written; `None` if the write is not like that. Where the type is known to the compiler,
-    /// little is left of this.
+    /// Writes as nearly all writes are: to a declared field, whose type the value has, with nothing to be checked. What is not like that
+    /// goes the long way.
     #[inline(always)]
-    fn write_plain(&mut self, field: FieldId, value: &Value) -> Option<bool> {
-        let node = self.nodes.get(field.node)?;
-        let declared = node.node_type.fields.get(field.index as usize)?;
-        if !declared.takes_all_of(value.field_type()) {
-            return None;
-        }
-        let slot = *node.slots.get(field.index as usize)?;
+    fn set_plain<T: FieldValue>(&mut self, field: FieldId, value: T) -> Result<(), Error> {
+        let declared = self.nodes.get(field.node).and_then(|node| {
+            let declared = node.node_type.fields.get(field.index as usize).filter(|declared| declared.takes_all_of(T::TYPE))?;
+            Some((declared.on_set == SetRule::Compare, *node.slots.get(field.index as usize)?))
+        });
+        let Some((compare, slot)) = declared else { return self.set_value(field, value.into()) };
         let revision = self.changes.last() + 1;
-        let written = self.columns.write(slot, value, declared.on_set == SetRule::Compare, revision);
-        if written {
+        if T::column_mut(&mut self.columns).write(slot, value, compare, revision) {
             self.changes.next();
             self.changes.wrote(slot_of(field.node), revision);
+            self.wrote(field);
         }
-        Some(written)
+        Ok(())
     }
 
     /// Writes a field without consequences: no evaluation, no callback, no route. Readers of revisions see it.

@@ -109,11 +109,16 @@ impl ChangeLog {
     pub(crate) fn wrote_all(&mut self, slots: Range<usize>, revision: Revision) {
         let boundary = *self.boundary.get_mut();
         let last = &mut self.nodes[slots.clone()];
-        // The sign says which is later; the and of all signs, that all are.
-        if last.iter().fold(u64::MAX, |all, last| all & boundary.wrapping_sub(*last)) >> 63 == 1 {
-            return last.fill(revision);
+        let logged = last.iter().filter(|last| **last > boundary).count();
+        if logged > 0 && logged < slots.len() {
+            return slots.for_each(|slot| self.wrote(slot as u32, revision));
         }
-        slots.for_each(|slot| self.wrote(slot as u32, revision));
+        last.fill(revision);
+        if logged == 0 {
+            let mut slots = slots.map(|slot| slot as u32);
+            slots.next().into_iter().for_each(|first| self.append(first, boundary));
+            self.log.extend(slots);
+        }
     }
 
     /// The last revision that a reader asked for, and the nodes' revisions; who writes these logs those who were not written since.

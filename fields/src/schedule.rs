@@ -111,7 +111,7 @@ impl Schedule {
     }
 
     /// Asks for a turn if anybody would hear of it: in this frame, or in the next if the node had its turn already.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn mark(&mut self, slot: u32) {
         if is_news(self.flags[slot as usize]) {
             self.enqueue(slot);

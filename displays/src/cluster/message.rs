@@ -8,7 +8,7 @@ use super::event::Event;
 use super::transport::ClusterError;
 
 /// Spoken by both ends; another one is refused.
-pub(super) const PROTOCOL: u16 = 6;
+pub(super) const PROTOCOL: u16 = 7;
 
 pub(super) const FRAME: &str = "umbriel/frame";
 /// Where a frame's packet lies in the application's memory.

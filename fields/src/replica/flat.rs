@@ -3,11 +3,12 @@
 
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 
-use super::herd::{Herd, Herds, Rows, Seat, Strand, start_and_step};
+use super::herd::{Herd, Herds, Rows, Seat, Strand, places_in_steps, start_and_step};
 use super::packet::{Draft, FieldOf, GroupRead, Place};
 use super::runs::Run;
-use super::shares::flat_share;
+use super::shares::{flat_share, share_evenly};
 use super::{ReplicaError, damaged};
+use crate::changes::ChangeLog;
 use crate::column::{Column, Columns};
 use crate::{Color, ColorA, FieldType, FieldValue, Graph, Revision};
 
@@ -47,10 +48,16 @@ pub(super) fn put_floats<const COUNT: usize>(bytes: &mut Vec<u8>, floats: [f32; 
     bytes.extend_from_slice(floats.map(f32::to_le_bytes).as_flattened());
 }
 
-/// Values of so many floats, each as its bits, from their bytes.
+/// Values of so many floats, from their bytes.
+#[inline]
+fn values_of<const COUNT: usize>(bytes: &[u8]) -> &[[[u8; 4]; COUNT]] {
+    bytes.as_chunks::<4>().0.as_chunks::<COUNT>().0
+}
+
+/// The same, each as its bits.
 #[inline]
 fn bits_of<const COUNT: usize>(bytes: &[u8]) -> impl Iterator<Item = [u32; COUNT]> {
-    bytes.as_chunks::<4>().0.as_chunks::<COUNT>().0.iter().map(|value| value.map(u32::from_le_bytes))
+    values_of::<COUNT>(bytes).iter().map(|value| value.map(u32::from_le_bytes))
 }
 
 /// Calls a function for the type of fields that hold nothing but a few floats; None for other types.
@@ -181,7 +188,7 @@ fn gather_even<T: Flat<COUNT>, const COUNT: usize>(
 ) -> Option<u64> {
     let (&[(first, place), (second, _), ..], column) = (nodes, T::column(columns)) else { return None };
     let places = place as usize..place as usize + nodes.len();
-    let (at, step) = start_and_step(&strand.slots[places.clone()]);
+    let (at, step) = places_in_steps(&strand.slots[places.clone()]);
     let revisions = column.revisions[at..].iter().step_by(step).take(nodes.len());
     match revisions.fold(0, |count, revision| count + (*revision > mark) as usize) {
         0 => return Some(0),
@@ -197,23 +204,14 @@ fn gather_even<T: Flat<COUNT>, const COUNT: usize>(
         for (value, into) in column.values[at..].iter().step_by(step).zip(into) {
             *into = value.floats().map(f32::to_le_bytes);
         }
-        added = share_evenly::<COUNT>(&numbers[places.clone()], index, &bytes[start..], &mut strand.shares[places]);
+        added = share_evenly(
+            start_and_step(&numbers[places.clone()]),
+            index,
+            bits_of::<COUNT>(&bytes[start..]),
+            &mut strand.shares[places],
+        );
     });
     Some(added)
-}
-
-/// Sets what values add to the hash whose nodes' numbers are in equal steps; gives the difference.
-#[inline]
-fn share_evenly<const COUNT: usize>(numbers: &[u64], index: u16, bytes: &[u8], shares: &mut [u64]) -> u64 {
-    let first = numbers.first().copied().unwrap_or(0);
-    let step = numbers.get(1).map_or(0, |second| second.wrapping_sub(first));
-    let (mut added, mut number) = (0u64, first);
-    for (share, bits) in shares.iter_mut().zip(bits_of::<COUNT>(bytes)) {
-        let stands = flat_share(number, index, bits);
-        added = added.wrapping_add(stands).wrapping_sub(std::mem::replace(share, stands));
-        number = number.wrapping_add(step);
-    }
-    added
 }
 
 /// Writes a group of a packet to the nodes' fields; None if its values are not flat. The hash follows what stands there then.
@@ -236,13 +234,11 @@ fn scatter<T: Flat<COUNT>, const COUNT: usize>(
         return Err(damaged("it has more places than values, or fewer"));
     }
     let column = T::column_mut(&mut graph.columns);
-    let mut written = Vec::new();
     let (mut bytes, mut added) = (group.values, 0u64);
     for run in group.runs.iter() {
         // One write, as far as readers are concerned.
         let revision = graph.changes.next();
-        let (boundary, nodes) = graph.changes.parts();
-        let mut target = Target { column: &mut *column, nodes, boundary, revision, written: &mut written };
+        let mut target = Target { column: &mut *column, changes: &mut graph.changes, revision };
         let (mut slot, mut left) = (run.first, run.count as usize);
         while left > 0 {
             let seat = herds.seats.get(slot as usize).filter(|seat| seat.number > 0);
@@ -259,8 +255,6 @@ fn scatter<T: Flat<COUNT>, const COUNT: usize>(
             slot = slot.wrapping_add(run.step.wrapping_mul(done as u32));
             bytes = &bytes[4 * COUNT * done..];
         }
-        graph.changes.log(&written);
-        written.clear();
     }
     herds.add(added);
     Ok(())
@@ -269,12 +263,8 @@ fn scatter<T: Flat<COUNT>, const COUNT: usize>(
 /// Where values go.
 struct Target<'a, T> {
     column: &'a mut Column<T>,
-    /// The revisions of nodes, and the one up to which they must be logged again.
-    nodes: &'a mut [Revision],
-    boundary: Revision,
+    changes: &'a mut ChangeLog,
     revision: Revision,
-    /// Nodes to be logged.
-    written: &'a mut Vec<u32>,
 }
 
 impl<T> Target<'_, T> {
@@ -295,7 +285,7 @@ impl<T> Target<'_, T> {
             return (even, self.write_evenly(rows, index, &bytes[..4 * COUNT * even]));
         }
         let (values, revisions) = (&mut self.column.values[..], &mut self.column.revisions[..]);
-        let (revision, boundary) = (self.revision, self.boundary);
+        let revision = self.revision;
         let (mut done, mut added, mut slot) = (0, 0u64, first);
         let places = rows.numbers.iter().zip(rows.slots).zip(&mut *rows.shares);
         for (((number, at), share), bits) in places.zip(bits_of::<COUNT>(bytes)) {
@@ -310,11 +300,7 @@ impl<T> Target<'_, T> {
             done += 1;
             slot = slot.wrapping_add(step);
         }
-        for node in &rows.nodes[..done] {
-            if std::mem::replace(&mut self.nodes[*node as usize], revision) <= boundary {
-                self.written.push(*node);
-            }
-        }
+        rows.nodes[..done].iter().for_each(|node| self.changes.wrote(*node, revision));
         (done, added)
     }
 
@@ -323,21 +309,18 @@ impl<T> Target<'_, T> {
     where
         T: Flat<COUNT>,
     {
-        let count = bytes.len() / (4 * COUNT);
-        let (at, step) = start_and_step(rows.slots);
-        for (value, bits) in self.column.values[at..].iter_mut().step_by(step).zip(bits_of::<COUNT>(bytes)) {
-            *value = T::of_floats(bits.map(f32::from_bits));
+        let values = values_of::<COUNT>(bytes);
+        let (at, step) = places_in_steps(rows.slots);
+        for (place, value) in self.column.values[at..].iter_mut().step_by(step).zip(values) {
+            *place = T::of_floats(value.map(f32::from_le_bytes));
         }
-        self.column.revisions[at..].iter_mut().step_by(step).take(count).for_each(|revision| *revision = self.revision);
-        let (node, step) = start_and_step(rows.nodes);
-        let mut slot = node;
-        for revision in self.nodes[node..].iter_mut().step_by(step).take(count) {
-            if std::mem::replace(revision, self.revision) <= self.boundary {
-                self.written.push(slot as u32);
-            }
-            slot += step;
+        self.column.revisions[at..].iter_mut().step_by(step).take(values.len()).for_each(|revision| *revision = self.revision);
+        let (node, step) = places_in_steps(rows.nodes);
+        match step {
+            1 => self.changes.wrote_all(node..node + values.len(), self.revision),
+            _ => rows.nodes[..values.len()].iter().for_each(|node| self.changes.wrote(*node, self.revision)),
         }
-        share_evenly::<COUNT>(rows.numbers, index, bytes, rows.shares)
+        share_evenly(start_and_step(rows.numbers), index, bits_of::<COUNT>(bytes), rows.shares)
     }
 }
 

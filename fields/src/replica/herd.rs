@@ -49,12 +49,19 @@ fn goes_on<T: Copy + Into<u64>>(list: &[T]) -> bool {
 
 /// Where equal steps start, and how long they are.
 #[inline]
-pub(super) fn start_and_step(list: &[u32]) -> (usize, usize) {
+pub(super) fn start_and_step<T: Copy + Into<u64>>(list: &[T]) -> (u64, u64) {
     match list {
         [] => (0, 1),
-        [only] => (*only as usize, 1),
-        [first, second, ..] => (*first as usize, second.wrapping_sub(*first) as usize),
+        [only] => ((*only).into(), 1),
+        [first, second, ..] => ((*first).into(), (*second).into().wrapping_sub((*first).into())),
     }
+}
+
+/// The same for places in an array.
+#[inline]
+pub(super) fn places_in_steps(list: &[u32]) -> (usize, usize) {
+    let (start, step) = start_and_step(list);
+    (start as usize, step as usize)
 }
 
 impl Herd {

@@ -6,13 +6,6 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 /// Odd numbers with as many ones as zeros in each byte, of wyhash.
 const SECRETS: [u64; 3] = [0x2d35_8dcc_aa6c_78a5, 0x8bb8_4b93_962e_acc9, 0x4b33_a62e_d433_d4a3];
 
-/// Both halves of a product: the step of wyhash (Wang Yi, final version 4).
-#[inline]
-fn fold(a: u64, b: u64) -> u64 {
-    let product = a as u128 * b as u128;
-    product as u64 ^ (product >> 64) as u64
-}
-
 #[inline]
 fn seed_of(number: u64, index: u16) -> u64 {
     number.wrapping_mul(SECRETS[0]) ^ (index as u64 + 1).wrapping_mul(SECRETS[1])
@@ -26,13 +19,50 @@ pub(super) fn field_share(number: u64, index: u16, bytes: &[u8]) -> u64 {
 /// What a field of a few floats adds, by their bits.
 #[inline]
 pub(super) fn flat_share<const COUNT: usize>(number: u64, index: u16, floats: [u32; COUNT]) -> u64 {
-    let word = |place: usize| floats.get(place).map_or(0, |float| *float as u64);
-    let mut state = seed_of(number, index) ^ (COUNT as u64).wrapping_mul(SECRETS[2]);
+    share(seed_of(number, index), floats)
+}
+
+/// Products of halves, as in XXH3 (Yann Collet): all of it can be done for several values at once.
+#[inline(always)]
+fn share<const COUNT: usize>(seed: u64, floats: [u32; COUNT]) -> u64 {
+    let pair = |place: usize| {
+        let word = |place: usize| floats.get(place).map_or(0, |float| *float as u64);
+        word(place) | word(place + 1) << 32
+    };
+    let halves = |pair: u64| (pair & 0xffff_ffff) * (pair >> 32);
+    let mut state = seed ^ (COUNT as u64).wrapping_mul(SECRETS[2]);
     for place in (0..COUNT).step_by(4) {
-        let (low, high) = (word(place) | word(place + 1) << 32, word(place + 2) | word(place + 3) << 32);
-        state = fold(low ^ state, high ^ SECRETS[2] ^ state.rotate_left(32));
+        let (low, high) = (pair(place) ^ state, pair(place + 2) ^ state.rotate_left(32) ^ SECRETS[2]);
+        state = halves(low).wrapping_add(high) ^ halves(high).wrapping_add(low).rotate_left(32);
     }
-    state.max(1)
+    state ^= state >> 37;
+    state = state.wrapping_mul(SECRETS[0]);
+    state ^= state >> 32;
+    state + (state == 0) as u64
+}
+
+/// Sets what values of a field add whose nodes' numbers begin somewhere and go on in equal steps; gives the difference.
+pub(super) fn share_evenly<const COUNT: usize>(
+    (first, step): (u64, u64),
+    index: u16,
+    values: impl Iterator<Item = [u32; COUNT]>,
+    shares: &mut [u64],
+) -> u64 {
+    // For all that this processor can do.
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || {
+            let (mut scaled, own) = (first.wrapping_mul(SECRETS[0]), seed_of(0, index));
+            let step = step.wrapping_mul(SECRETS[0]);
+            let mut added = 0u64;
+            for (before, floats) in shares.iter_mut().zip(values) {
+                let stands = share(scaled ^ own, floats);
+                added = added.wrapping_add(stands).wrapping_sub(std::mem::replace(before, stands));
+                scaled = scaled.wrapping_add(step);
+            }
+            added
+        },
+    )
 }
 
 /// What a node adds by its type and name.
@@ -67,6 +97,22 @@ mod tests {
             let mut words = [0u32; 16];
             words[bit / 32] = 1 << (bit % 32);
             check(flat_share(7, 0, words));
+        }
+    }
+
+    #[test]
+    fn many_in_equal_steps_are_as_one_by_one() {
+        let (first, step, index) = (3 << 32 | 70, (1u64 << 32) + 5, 4);
+        for count in 0..70u64 {
+            let values: Vec<[u32; 3]> = (0..count as u32).map(|word| [word, word.wrapping_mul(0x9e37_79b9), !word]).collect();
+            let mut shares: Vec<u64> = (1..=count).collect();
+            let before = shares.clone();
+            let added = share_evenly((first, step), index, values.iter().copied(), &mut shares);
+            let expected: Vec<u64> =
+                values.iter().zip(0..).map(|(value, place)| flat_share(first + step * place, index, *value)).collect();
+            assert_eq!(shares, expected);
+            let sum = |shares: &[u64]| shares.iter().fold(0u64, |sum, share| sum.wrapping_add(*share));
+            assert_eq!(added, sum(&expected).wrapping_sub(sum(&before)));
         }
     }
 
