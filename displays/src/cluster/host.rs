@@ -193,7 +193,7 @@ impl Host {
     /// for nobody longer than the timeout.
     pub fn frame(&mut self, graph: &Graph, is_last: bool) {
         // All that can be done before the displays are.
-        let packet = stamped(self.epoch, self.publisher.frame(graph));
+        let packet = stamped(self.epoch, self.publisher.unsealed_frame(graph));
         let (frame, hash) = (self.publisher.last_frame(), self.publisher.hash());
         let (parcel, spare) = Parcel::new(packet, &mut self.shelf, &self.outlets);
         spare.into_iter().for_each(|spare| self.publisher.reuse(spare));

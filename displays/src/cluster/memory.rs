@@ -5,9 +5,14 @@
 //! it. It takes no part of `/dev/shm`. Who cannot open it (another machine, another user, another system than Linux) gets packets over the network.
 
 use std::fs::File;
-use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom, Write};
+use std::io::{Error, ErrorKind, Result, Seek, SeekFrom, Write};
 
 use serde::{Deserialize, Serialize};
+
+#[cfg(not(target_os = "linux"))]
+use self::elsewhere::{View, descriptor, nameless};
+#[cfg(target_os = "linux")]
+use self::linux::{View, descriptor, nameless};
 
 /// So many packets lie there at the least: the one that is read, the one that follows, and two for who is late.
 const FEWEST_PLACES: u64 = 4;
@@ -17,7 +22,8 @@ const MOST_PLACES: u64 = 512;
 /// More places than the fewest take no more than this, so that large packets stay in the processor's caches.
 const ROOM_BYTES: u64 = 2 << 20;
 /// Before the places: the token, and the number of the last packet whose place may be written anew.
-const HEAD: u64 = 16;
+const TOKEN: usize = 0;
+const GONE: usize = 8;
 /// Where the first place begins; places are whole pages.
 const PAGE: u64 = 4096;
 /// As the system shows it.
@@ -75,6 +81,10 @@ impl Shelf {
             self.place_bytes = (length + length / 4).next_multiple_of(PAGE);
             self.places = (ROOM_BYTES / self.place_bytes).clamp(FEWEST_PLACES, MOST_PLACES);
             self.gone = self.number - 1;
+            let end = PAGE + self.places * self.place_bytes;
+            if end > self.file.metadata()?.len() {
+                self.file.set_len(end)?;
+            }
         }
         let head = [self.token.to_le_bytes(), self.gone.to_le_bytes()].concat();
         // Who reads what is about to be written over finds that out afterwards.
@@ -101,7 +111,7 @@ pub(super) enum Found {
 #[derive(Debug, Default)]
 pub(super) struct Reader {
     /// With its token.
-    open: Option<(u64, File)>,
+    open: Option<(u64, View)>,
     /// Where a packet was that is not needed any more: new memory costs as much as reading.
     spare: Vec<u8>,
 }
@@ -114,10 +124,10 @@ impl Reader {
 
     pub(super) fn read(&mut self, whereabouts: &Whereabouts) -> Found {
         if self.open.as_ref().is_none_or(|(token, _)| *token != whereabouts.token) {
-            self.open = open(whereabouts).map(|file| (whereabouts.token, file)).ok();
+            self.open = View::open(whereabouts).map(|view| (whereabouts.token, view)).ok();
         }
-        let Some((_, file)) = &self.open else { return Found::Elsewhere };
-        match packet_at(file, whereabouts, std::mem::take(&mut self.spare)) {
+        let Some((_, view)) = &mut self.open else { return Found::Elsewhere };
+        match view.packet(whereabouts, std::mem::take(&mut self.spare)) {
             Ok(Some(bytes)) => Found::Packet(bytes),
             Ok(None) => Found::Gone,
             Err(error) => {
@@ -128,72 +138,120 @@ impl Reader {
     }
 }
 
-fn packet_at(file: &File, whereabouts: &Whereabouts, spare: Vec<u8>) -> Result<Option<Vec<u8>>> {
-    let Whereabouts { number, at, length, .. } = whereabouts;
-    if at.saturating_add(*length) > file.metadata()?.len() {
-        return Err(ErrorKind::UnexpectedEof.into());
-    }
-    let bytes = read_at(file, *at, *length, spare)?;
-    let head = read_at(file, 0, HEAD, Vec::new())?;
-    let gone = head.last_chunk().map_or(u64::MAX, |gone| u64::from_le_bytes(*gone));
-    Ok((*number > gone && bytes.len() as u64 == *length).then_some(bytes))
-}
-
 fn write_at(mut file: &File, at: u64, bytes: &[u8]) -> Result<()> {
     file.seek(SeekFrom::Start(at))?;
     file.write_all(bytes)
 }
 
-fn read_at(mut file: &File, at: u64, length: u64, mut bytes: Vec<u8>) -> Result<Vec<u8>> {
-    bytes.clear();
-    bytes.reserve(length as usize);
-    file.seek(SeekFrom::Start(at))?;
-    file.take(length).read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
-
-/// A file that nobody finds by a name.
 #[cfg(target_os = "linux")]
-fn nameless() -> Result<File> {
-    use std::os::unix::fs::PermissionsExt;
-    let file = File::from(rustix::fs::memfd_create(NAME, rustix::fs::MemfdFlags::CLOEXEC)?);
-    // Others of the same user may read it; this process holds it open for writing already.
-    file.set_permissions(std::fs::Permissions::from_mode(0o400))?;
-    Ok(file)
-}
-
-#[cfg(target_os = "linux")]
-fn descriptor(file: &File) -> i32 {
+mod linux {
     use std::os::fd::AsRawFd;
-    file.as_raw_fd()
-}
+    use std::os::unix::fs::PermissionsExt;
+    use std::sync::Arc;
+    use std::sync::atomic::{Ordering, fence};
 
-#[cfg(target_os = "linux")]
-fn open(whereabouts: &Whereabouts) -> Result<File> {
-    let path = std::path::PathBuf::from(format!("/proc/{}/fd/{}", whereabouts.process, whereabouts.file));
-    // On another machine this may be anything, and only to open it may do something.
-    if !std::fs::read_link(&path)?.to_string_lossy().starts_with(&format!("/memfd:{NAME}")) {
-        return Err(ErrorKind::NotFound.into());
+    use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, fcntl_get_seals, memfd_create};
+    use rustix::mm::{MapFlags, ProtFlags};
+    use vm_memory::mmap::MmapRegionBuilder;
+    use vm_memory::{Bytes, FileOffset, MmapRegion, VolatileMemory};
+
+    use super::*;
+
+    /// A file that nobody finds by a name, and that does not shrink: who maps it need not fear to find nothing there.
+    pub(super) fn nameless() -> Result<File> {
+        let file = File::from(memfd_create(NAME, MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)?);
+        fcntl_add_seals(&file, SealFlags::SHRINK | SealFlags::SEAL)?;
+        // Others of the same user may read it; this process holds it open for writing already.
+        file.set_permissions(std::fs::Permissions::from_mode(0o400))?;
+        Ok(file)
     }
-    let file = File::open(path)?;
-    let head = read_at(&file, 0, HEAD, Vec::new())?;
-    let is_same = head.first_chunk() == Some(&whereabouts.token.to_le_bytes());
-    if is_same { Ok(file) } else { Err(Error::new(ErrorKind::NotFound, "it is other memory")) }
+
+    pub(super) fn descriptor(file: &File) -> i32 {
+        file.as_raw_fd()
+    }
+
+    /// The memory of an application, as another process sees it.
+    #[derive(Debug)]
+    pub(super) struct View {
+        file: Arc<File>,
+        /// All that there was of it when it was looked for last.
+        map: MmapRegion,
+    }
+
+    impl View {
+        pub(super) fn open(whereabouts: &Whereabouts) -> Result<View> {
+            let path = std::path::PathBuf::from(format!("/proc/{}/fd/{}", whereabouts.process, whereabouts.file));
+            // On another machine this may be anything, and only to open it may do something.
+            if !std::fs::read_link(&path)?.to_string_lossy().starts_with(&format!("/memfd:{NAME}")) {
+                return Err(ErrorKind::NotFound.into());
+            }
+            let file = Arc::new(File::open(path)?);
+            if !fcntl_get_seals(&file)?.contains(SealFlags::SHRINK) {
+                return Err(Error::new(ErrorKind::NotFound, "it may shrink"));
+            }
+            let map = map(&file)?;
+            let view = View { file, map };
+            let is_same = view.word(TOKEN)? == whereabouts.token;
+            if is_same { Ok(view) } else { Err(Error::new(ErrorKind::NotFound, "it is other memory")) }
+        }
+
+        fn word(&self, at: usize) -> Result<u64> {
+            let word = self.map.as_volatile_slice().load::<u64>(at, Ordering::Acquire).map_err(Error::other)?;
+            Ok(u64::from_le(word))
+        }
+
+        /// Reads a packet into memory that may have been another's. None if it was written over.
+        pub(super) fn packet(&mut self, whereabouts: &Whereabouts, mut bytes: Vec<u8>) -> Result<Option<Vec<u8>>> {
+            let Whereabouts { number, at, length, .. } = *whereabouts;
+            let end = at.saturating_add(length);
+            if end > self.map.size() as u64 {
+                self.map = map(&self.file)?;
+            }
+            if end > self.map.size() as u64 {
+                return Err(ErrorKind::UnexpectedEof.into());
+            }
+            bytes.resize(length as usize, 0);
+            self.map.as_volatile_slice().read_slice(&mut bytes, at as usize).map_err(Error::other)?;
+            // What was read was read before this.
+            fence(Ordering::Acquire);
+            Ok((number > self.word(GONE)?).then_some(bytes))
+        }
+    }
+
+    fn map(file: &Arc<File>) -> Result<MmapRegion> {
+        let length = file.metadata()?.len() as usize;
+        let map = MmapRegionBuilder::new(length)
+            .with_mmap_prot(ProtFlags::READ.bits() as i32)
+            .with_mmap_flags((MapFlags::SHARED | MapFlags::NORESERVE).bits() as i32)
+            .with_file_offset(FileOffset::from_arc(file.clone(), 0));
+        map.build().map_err(Error::other)
+    }
 }
 
 #[cfg(not(target_os = "linux"))]
-fn nameless() -> Result<File> {
-    Err(ErrorKind::Unsupported.into())
-}
+mod elsewhere {
+    use super::*;
 
-#[cfg(not(target_os = "linux"))]
-fn descriptor(_: &File) -> i32 {
-    -1
-}
+    pub(super) fn nameless() -> Result<File> {
+        Err(ErrorKind::Unsupported.into())
+    }
 
-#[cfg(not(target_os = "linux"))]
-fn open(_: &Whereabouts) -> Result<File> {
-    Err(ErrorKind::Unsupported.into())
+    pub(super) fn descriptor(_: &File) -> i32 {
+        -1
+    }
+
+    #[derive(Debug)]
+    pub(super) enum View {}
+
+    impl View {
+        pub(super) fn open(_: &Whereabouts) -> Result<View> {
+            Err(ErrorKind::Unsupported.into())
+        }
+
+        pub(super) fn packet(&mut self, _: &Whereabouts, _: Vec<u8>) -> Result<Option<Vec<u8>>> {
+            match *self {}
+        }
+    }
 }
 
 #[cfg(all(test, target_os = "linux"))]
@@ -234,11 +292,16 @@ mod tests {
         let mut shelf = Shelf::make().unwrap();
         let here = shelf.put(b"packet").unwrap();
         let other_file = File::open("/dev/null").unwrap();
+        // With the right token, but nothing says that it will not shrink.
+        let unsealed = File::from(rustix::fs::memfd_create(NAME, rustix::fs::MemfdFlags::CLOEXEC).unwrap());
+        write_at(&unsealed, 0, &[here.token.to_le_bytes(), 0u64.to_le_bytes()].concat()).unwrap();
+        write_at(&unsealed, here.at, b"packet").unwrap();
         let rows = [
             Whereabouts::default(),
             Whereabouts { token: here.token ^ 1, ..here },
             Whereabouts { process: u32::MAX, ..here },
             Whereabouts { file: descriptor(&other_file), ..here },
+            Whereabouts { file: descriptor(&unsealed), ..here },
             Whereabouts { length: 1 << 60, ..here },
             Whereabouts { at: u64::MAX, ..here },
         ];

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use umbriel_fields::replica::{Deed, Packet, ReplicaError};
+use umbriel_fields::replica::{Deed, Packet, ReplicaError, seal};
 
 use super::event::Event;
 use super::transport::ClusterError;
@@ -151,6 +151,12 @@ pub(super) fn message_of<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, C
 pub(super) fn stamped(epoch: u64, mut packet: Vec<u8>) -> Vec<u8> {
     packet.extend_from_slice(&epoch.to_le_bytes());
     packet
+}
+
+/// Writes the checksum into such a packet, which is to go over the network.
+pub(super) fn seal_stamped(bytes: &mut [u8]) {
+    let length = bytes.len().saturating_sub(size_of::<u64>());
+    seal(&mut bytes[..length]);
 }
 
 /// The run of the application, and its packet.

@@ -108,15 +108,23 @@ mod unix {
             Ok(Ear(UnixListener::bind_addr(&name_of(port)?)?))
         }
 
-        /// The next that comes; an error once this is closed. Who is of another user is not let in.
-        pub(in crate::cluster) fn accept(&self) -> Result<Pipe> {
-            loop {
-                let (stream, _) = self.0.accept()?;
-                match is_ours(&stream) {
-                    Ok(()) => return Ok(Pipe(stream)),
-                    Err(error) => tracing::warn!("on the short line: {error}"),
-                }
+        /// The next that comes; none for who is of another user and is not let in, and an error once this is closed.
+        pub(in crate::cluster) fn accept(&self) -> Result<Option<Pipe>> {
+            let (stream, _) = self.0.accept()?;
+            let let_in = is_ours(&stream).inspect_err(|error| tracing::warn!("on the short line: {error}"));
+            Ok(let_in.is_ok().then_some(Pipe(stream)))
+        }
+
+        /// Waits until somebody comes, or something down one of these lines, or until one is closed. Says whether somebody came, and of
+        /// each line whether there is something to be received.
+        pub(in crate::cluster) fn wait<'a>(&self, lines: impl Iterator<Item = &'a Pipe>) -> (bool, Vec<bool>) {
+            let fds = std::iter::once(self.0.as_fd()).chain(lines.map(|line| line.0.as_fd()));
+            let mut all: Vec<PollFd<'_>> = fds.map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)).collect();
+            if poll(&mut all, None).is_err() {
+                // A signal came; nothing else did.
+                return (false, vec![false; all.len() - 1]);
             }
+            (!all[0].revents().is_empty(), all[1..].iter().map(|one| !one.revents().is_empty()).collect())
         }
 
         pub(in crate::cluster) fn close(&self) {
@@ -211,7 +219,10 @@ mod nowhere {
         pub(in crate::cluster) fn open(_: u16) -> Result<Ear> {
             Err(std::io::ErrorKind::Unsupported.into())
         }
-        pub(in crate::cluster) fn accept(&self) -> Result<Pipe> {
+        pub(in crate::cluster) fn accept(&self) -> Result<Option<Pipe>> {
+            match *self {}
+        }
+        pub(in crate::cluster) fn wait<'a>(&self, _: impl Iterator<Item = &'a Pipe>) -> (bool, Vec<bool>) {
             match *self {}
         }
         pub(in crate::cluster) fn close(&self) {
@@ -269,7 +280,7 @@ mod tests {
         let ear = Ear::open(ear_port).unwrap();
         assert!(Ear::open(ear_port).is_err(), "the name is taken");
         let there = Pipe::connect(ear_port).unwrap();
-        let here = ear.accept().unwrap();
+        let here = ear.accept().unwrap().unwrap();
         let long = vec![7; 40_000];
         let words: [(Word, &[u8]); 4] = [(Word::Here, b"abc"), (Word::Release, b""), (Word::Here, &long), (Word::Ready, b"x")];
         let mut bytes = Vec::new();
@@ -307,7 +318,7 @@ mod tests {
         let ear_port = port();
         let ear = Ear::open(ear_port).unwrap();
         let there = Pipe::connect(ear_port).unwrap();
-        let here = ear.accept().unwrap();
+        let here = ear.accept().unwrap().unwrap();
         (0..100_000).for_each(|_| there.send(&[1; 64]).unwrap());
         drop(here);
         assert!(there.send(&[1; 64]).is_err());
@@ -318,7 +329,7 @@ mod tests {
         let ear_port = port();
         let ear = Ear::open(ear_port).unwrap();
         let there = Pipe::connect(ear_port).unwrap();
-        let here = ear.accept().unwrap();
+        let here = ear.accept().unwrap().unwrap();
         let bell = Bell::new();
         let started = std::time::Instant::now();
         bell.ring();

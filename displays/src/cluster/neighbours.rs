@@ -99,24 +99,15 @@ pub(super) struct Listening {
 }
 
 impl Listening {
-    /// Lets displays come to the name of a port that know a token; what they say goes to the gate, on threads of theirs.
+    /// Lets displays come to the name of a port that know a token; what they say goes to the gate, on one thread for all, so that those who
+    /// are ready at the same time do not wait for each other.
     ///
     /// # Errors
     /// The name is taken, or the system has no such lines.
     pub(super) fn start(port: u16, token: u64, neighbours: Neighbours, gate: SharedGate) -> std::io::Result<Listening> {
         let ear = Arc::new(Ear::open(port)?);
-        let (listener, lines) = (ear.clone(), neighbours.clone());
-        let thread = std::thread::spawn(move || {
-            while let Ok(pipe) = listener.accept() {
-                let Ok(sender) = pipe.try_clone() else { continue };
-                let (lines, gate, number) = (lines.clone(), gate.clone(), lines.add(sender));
-                std::thread::spawn(move || {
-                    hear(&pipe, number, token, &lines, &gate);
-                    pipe.shut();
-                    lines.remove(number);
-                });
-            }
-        });
+        let mut listener = Listener { ear: ear.clone(), token, neighbours: neighbours.clone(), gate, lines: Vec::new() };
+        let thread = std::thread::spawn(move || while listener.listen() {});
         Ok(Listening { ear, thread: Some(thread), neighbours })
     }
 }
@@ -130,31 +121,81 @@ impl Drop for Listening {
     }
 }
 
-/// Takes what a display says, until the line is closed or it says what it should not.
-fn hear(pipe: &Pipe, number: u64, token: u64, neighbours: &Neighbours, gate: &SharedGate) {
-    let mut heard = Heard::default();
-    let mut display = None;
-    while heard.more(pipe) {
-        while let Some(word) = heard.next() {
-            match (word, display) {
+/// Of a line, the end that hears.
+struct Line {
+    number: u64,
+    pipe: Pipe,
+    heard: Heard,
+    /// Whose it is, once it said so.
+    display: Option<u64>,
+}
+
+struct Listener {
+    ear: Arc<Ear>,
+    token: u64,
+    neighbours: Neighbours,
+    gate: SharedGate,
+    lines: Vec<Line>,
+}
+
+impl Listener {
+    /// Takes what comes next; false once nobody can come any more.
+    fn listen(&mut self) -> bool {
+        let (somebody, said) = self.ear.wait(self.lines.iter().map(|line| &line.pipe));
+        let mut said = said.into_iter();
+        let Listener { token, neighbours, gate, lines, .. } = self;
+        let is_over = |line: &mut Line| said.next() == Some(true) && !line.hear(*token, neighbours, gate);
+        for line in lines.extract_if(.., is_over) {
+            line.pipe.shut();
+            neighbours.remove(line.number);
+        }
+        if !somebody {
+            return true;
+        }
+        match self.ear.accept() {
+            Ok(came) => {
+                self.lines.extend(came.and_then(|pipe| {
+                    let number = self.neighbours.add(pipe.try_clone().ok()?);
+                    Some(Line { number, pipe, heard: Heard::default(), display: None })
+                }));
+                true
+            }
+            Err(_) => false,
+        }
+    }
+}
+
+impl Line {
+    /// Takes what a display said; false if the line is closed, or if it said what it should not.
+    fn hear(&mut self, token: u64, neighbours: &Neighbours, gate: &SharedGate) -> bool {
+        let is_whole = self.heard.more(&self.pipe);
+        while let Some(word) = self.heard.next() {
+            match (word, self.display) {
                 (Ok((Word::Hello, message)), None) => match message_of::<Hello>(message) {
                     Ok(hello) if hello.token == token => {
-                        neighbours.introduce(number, hello.display);
-                        display = Some(hello.display);
+                        neighbours.introduce(self.number, hello.display);
+                        self.display = Some(hello.display);
                     }
-                    _ => return tracing::warn!("somebody on the short line does not know this application"),
+                    _ => {
+                        tracing::warn!("somebody on the short line does not know this application");
+                        return false;
+                    }
                 },
                 (Ok((Word::Ready, message)), Some(display)) => {
                     let is_its_own = message_of::<Ready>(message).is_ok_and(|ready| ready.display == display);
                     let mut gate = enter(gate);
                     // Who was given up meanwhile is not heard here: nobody would give it up again.
-                    if !is_its_own || !neighbours.is_of(number, display) || !gate.names.contains_key(&display) {
-                        return;
+                    if !is_its_own || !neighbours.is_of(self.number, display) || !gate.names.contains_key(&display) {
+                        return false;
                     }
                     gate.is_ready(message);
                 }
-                _ => return tracing::warn!("on the short line: words that make no sense"),
+                _ => {
+                    tracing::warn!("on the short line: words that make no sense");
+                    return false;
+                }
             }
         }
+        is_whole
     }
 }

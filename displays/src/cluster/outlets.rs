@@ -8,7 +8,7 @@ use zenoh::{Session, Wait};
 
 use super::backlog::MOST_BYTES;
 use super::memory::{Shelf, Whereabouts};
-use super::message::{FRAME, HERE, RELEASE, Release, bytes_of};
+use super::message::{FRAME, HERE, RELEASE, Release, bytes_of, seal_stamped};
 use super::near::Word;
 use super::neighbours::Neighbours;
 use super::queue::{Flood, Queue};
@@ -47,7 +47,7 @@ pub(super) struct Parcel {
 
 impl Parcel {
     /// Puts a packet into memory where somebody reads it there. Gives the packet back if nobody wants it otherwise.
-    pub(super) fn new(packet: Vec<u8>, shelf: &mut Option<Shelf>, outlets: &Outlets) -> (Parcel, Option<Vec<u8>>) {
+    pub(super) fn new(mut packet: Vec<u8>, shelf: &mut Option<Shelf>, outlets: &Outlets) -> (Parcel, Option<Vec<u8>>) {
         let length = packet.len() as u64;
         let put =
             shelf.as_mut().filter(|_| outlets.neighbours.listen() || is_heard(&outlets.here)).map(|shelf| shelf.put(&packet));
@@ -60,7 +60,10 @@ impl Parcel {
             })
         });
         match is_heard(&outlets.frames) {
-            true => (Parcel { packet, whereabouts, length }, None),
+            true => {
+                seal_stamped(&mut packet);
+                (Parcel { packet, whereabouts, length }, None)
+            }
             false => (Parcel { packet: Vec::new(), whereabouts, length }, Some(packet)),
         }
     }

@@ -56,7 +56,9 @@ impl Proxy {
         let (line, started) = (self.line.clone(), self.started);
         std::thread::spawn(move || {
             while let Ok(near) = ear.accept() {
-                if let Ok(far) = Pipe::connect(to) {
+                if let Some(near) = near
+                    && let Ok(far) = Pipe::connect(to)
+                {
                     join(near.0, far.0, &line, started);
                 }
             }

@@ -112,7 +112,7 @@ mod tests {
         let ear = Ear::open(port).unwrap();
         let mut short = Short::at(Some(port));
         short.look(1, 2);
-        let application = ear.accept().unwrap();
+        let application = ear.accept().unwrap().unwrap();
         let mut words = Vec::new();
         assert!(append(&mut words, Word::Here, b"a") && append(&mut words, Word::Release, b"b"));
         application.send(&words).unwrap();

@@ -32,7 +32,7 @@ pub use bulk::{Bulk, hash_of_long_value};
 pub use deeds::{Deed, node_numbered, number_of, own_key};
 pub use difference::Difference;
 pub use mirror::{Deeds, Mirror};
-pub use packet::Packet;
+pub use packet::{Packet, seal};
 pub use publisher::Publisher;
 
 /// Why a packet cannot be used.

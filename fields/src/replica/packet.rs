@@ -17,6 +17,8 @@ const MAGIC: [u8; 4] = *b"UMBf";
 const VERSION: u16 = 3;
 /// What is checked by the checksum begins after magic, version and checksum.
 const CHECKED: usize = 4 + 2 + 8;
+/// The checksum of a packet that does not leave the machine on which it was made.
+const UNSEALED: u64 = 0;
 /// The length of the head follows, and then the values; the head comes last, since it tells of all of them.
 const VALUES: usize = CHECKED + 4;
 
@@ -126,9 +128,20 @@ impl Draft {
         bytes[..4].copy_from_slice(&MAGIC);
         bytes[4..6].copy_from_slice(&VERSION.to_le_bytes());
         bytes[CHECKED..VALUES].copy_from_slice(&(head.len() as u32).to_le_bytes());
-        let checksum = xxh3_64_with_seed(&bytes[CHECKED..], VERSION as u64);
-        bytes[6..CHECKED].copy_from_slice(&checksum.to_le_bytes());
+        bytes[6..CHECKED].copy_from_slice(&UNSEALED.to_le_bytes());
         bytes
+    }
+}
+
+fn checksum(bytes: &[u8]) -> u64 {
+    xxh3_64_with_seed(&bytes[CHECKED..], VERSION as u64).max(UNSEALED + 1)
+}
+
+/// Writes the checksum into a packet that is to leave this machine.
+pub fn seal(packet: &mut [u8]) {
+    if packet.len() >= VALUES {
+        let checksum = checksum(packet);
+        packet[6..CHECKED].copy_from_slice(&checksum.to_le_bytes());
     }
 }
 
@@ -157,7 +170,7 @@ pub(super) struct GroupRead<'a> {
 }
 
 impl<'a> Packet<'a> {
-    /// Reads a packet and checks it. Takes its bytes, or borrows them.
+    /// Reads a packet and checks it, its checksum only where it was [sealed](seal). Takes its bytes, or borrows them.
     pub fn read(bytes: impl Into<Cow<'a, [u8]>>) -> Result<Packet<'a>, ReplicaError> {
         let bytes = bytes.into();
         if bytes.len() < VALUES || bytes[..4] != MAGIC {
@@ -167,7 +180,8 @@ impl<'a> Packet<'a> {
         if found != VERSION {
             return Err(ReplicaError::WrongVersion { found, ours: VERSION });
         }
-        if xxh3_64_with_seed(&bytes[CHECKED..], VERSION as u64).to_le_bytes() != bytes[6..CHECKED] {
+        let sealed = u64::from_le_bytes(std::array::from_fn(|place| bytes[6 + place]));
+        if sealed != UNSEALED && sealed != checksum(&bytes) {
             return Err(damaged("its checksum is wrong"));
         }
         let length = u32::from_le_bytes(std::array::from_fn(|place| bytes[CHECKED + place])) as usize;

@@ -8,7 +8,7 @@ use slotmap::Key;
 use super::bulk::{ImageHashes, LONG, Offered, hash_of_value, message_of_image, message_of_value};
 use super::flat::{Written, gather_flat, put_flat, share_of_flat};
 use super::herd::Herds;
-use super::packet::{Draft, FieldOf, Place, TypeRecord};
+use super::packet::{Draft, FieldOf, Place, TypeRecord, seal};
 use super::routes::KnownRoutes;
 use super::shares::field_share;
 use crate::codec::{Name, PlainField, Ref, to_bytes};
@@ -105,6 +105,13 @@ impl Publisher {
 
     /// The next frame: what was written since the last one. To be called between evaluations.
     pub fn frame(&mut self, graph: &Graph) -> Vec<u8> {
+        let mut packet = self.unsealed_frame(graph);
+        seal(&mut packet);
+        packet
+    }
+
+    /// The same without a checksum, for who stays on this machine; [`seal`] it for others.
+    pub fn unsealed_frame(&mut self, graph: &Graph) -> Vec<u8> {
         self.frame += 1;
         let mut draft = Draft::new(std::mem::take(&mut self.spare), self.usual_length);
         self.new.clear();
@@ -256,7 +263,9 @@ impl Publisher {
             }
         }
         draft.head.routes = self.routes.all();
-        Some(self.finish(graph, draft))
+        let mut packet = self.finish(graph, draft);
+        seal(&mut packet);
+        Some(packet)
     }
 
     fn finish(&self, graph: &Graph, mut draft: Draft) -> Vec<u8> {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use umbriel_fields::replica::{Bulk, Packet, Publisher, Replica, ReplicaError};
+use umbriel_fields::replica::{Bulk, Packet, Publisher, Replica, ReplicaError, seal};
 use umbriel_fields::{Field, Graph, Image, NodeId, NodeType};
 
 use crate::support::types;
@@ -207,15 +207,17 @@ fn bad_packets_are_told_and_do_no_harm() {
     // With a checksum that fits, the records are all that protects.
     for place in 14..good.len() {
         let mut bytes = changed(place, 255);
-        let checksum = xxhash_rust::xxh3::xxh3_64_with_seed(&bytes[14..], 3);
-        bytes[6..14].copy_from_slice(&checksum.to_le_bytes());
+        seal(&mut bytes);
         if let Ok(packet) = Packet::read(&bytes) {
             let mut victim = replica_of(&mut publisher, &graph, &mut bulk);
             let _ = victim.apply(&packet, &bulk);
             victim.graph().verify_invariants().unwrap();
         }
     }
-    let next = publisher.frame(&graph);
+    let mut next = publisher.unsealed_frame(&graph);
+    let unsealed = next.clone();
+    seal(&mut next);
+    assert!(error(&unsealed).is_none() && error(&next).is_none() && unsealed[6..14] == [0; 8] && next[14..] == unsealed[14..]);
     let gap = replica.apply(&Packet::read(&next).unwrap(), &bulk);
     assert_eq!(gap, Err(ReplicaError::Gap { last: 1, found: 3 }));
     replica.apply(&Packet::read(&good).unwrap(), &bulk).unwrap();
