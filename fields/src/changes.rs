@@ -23,6 +23,17 @@ pub enum Changes {
 /// A log shorter than this is never cut.
 const SMALLEST_LIMIT: usize = 65_536;
 
+/// Nodes side by side that are looked at together.
+const BLOCK: usize = 64;
+
+/// Appends a run to others that end before it.
+pub(crate) fn append_run(runs: &mut Vec<Range<u32>>, run: Range<u32>) {
+    match runs.last_mut() {
+        Some(last) if last.end == run.start => last.end = run.end,
+        _ => runs.push(run),
+    }
+}
+
 /// Who was written when.
 #[derive(Debug, Default)]
 pub(crate) struct ChangeLog {
@@ -197,21 +208,31 @@ impl ChangeLog {
         (segment, self.segments.get(segment).map_or(0, |(_, start)| start - self.dropped))
     }
 
-    /// Slots of nodes written after a revision, in ascending order, whether or not anything stands there still.
-    pub(crate) fn slots_since(&self, revision: Revision) -> Vec<u32> {
+    /// Slots of nodes written after a revision, those side by side together, in ascending order, whether or not anything stands there still.
+    pub(crate) fn slots_since(&self, revision: Revision) -> Vec<Range<u32>> {
+        let mut runs = Vec::new();
         if revision >= self.revision {
-            return Vec::new();
+            return runs;
         }
         let is_new = |slot: &u32| self.nodes[*slot as usize] > revision;
         let (_, start) = self.segment(revision);
         // Looking at all nodes in a row takes no longer than sorting an eighth of them.
         if revision < self.floor || (self.log.len() - start) * 8 > self.nodes.len() {
-            return (0..self.nodes.len() as u32).filter(is_new).collect();
+            for (first, nodes) in (0..).step_by(BLOCK).zip(self.nodes.chunks(BLOCK)) {
+                let slots = first..first + nodes.len() as u32;
+                match nodes.iter().filter(|node| **node > revision).count() {
+                    0 => {}
+                    count if count == nodes.len() => append_run(&mut runs, slots),
+                    _ => slots.filter(is_new).for_each(|slot| append_run(&mut runs, slot..slot + 1)),
+                }
+            }
+            return runs;
         }
         let mut slots: Vec<u32> = self.log.range(start..).copied().filter(is_new).collect();
         slots.sort_unstable();
         slots.dedup();
-        slots
+        slots.into_iter().for_each(|slot| append_run(&mut runs, slot..slot + 1));
+        runs
     }
 
     /// Nodes written or deleted after a revision. `ids` by slot; dead slots hold null.

@@ -1,6 +1,9 @@
 //! Values that are nothing but a few floats, which most of what changes every frame is: their bytes are those of the codec, but they go
 //! to and from columns without a [`Value`](crate::Value) and without serde.
 
+use std::cell::OnceCell;
+use std::ops::Range;
+
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 
 use super::herd::{Herd, Herds, Rows, Seat, Strand, places_in_steps, start_and_step};
@@ -94,124 +97,133 @@ pub(super) fn share_of_flat(columns: &Columns, field_type: FieldType, slot: u32,
     for_flat!(field_type, share(columns, slot, number, index))
 }
 
-/// Nodes of a herd that were written.
-#[derive(Clone, Copy)]
+/// Nodes of a herd that were written after a revision.
 pub(super) struct Written<'a> {
-    /// Their slots and places, by slot.
-    pub(super) nodes: &'a [(u32, u32)],
-    /// Their places follow each other, and all that belongs to them lies in equal steps.
-    is_even: bool,
+    mark: Revision,
+    /// Their places, those side by side together.
+    runs: &'a [Range<u32>],
+    /// The same one by one, once they were asked for.
+    places: OnceCell<Vec<u32>>,
+    /// Where they are side by side, and all that belongs to them lies in equal steps.
+    even: Option<Range<usize>>,
 }
 
 impl<'a> Written<'a> {
-    pub(super) fn of(herd: &Herd, nodes: &'a [(u32, u32)]) -> Written<'a> {
-        let (first, last) = (nodes.first().map_or(0, |(_, place)| *place), nodes.last().map_or(0, |(_, place)| *place));
-        let may_be = nodes.len() >= FEW && last.wrapping_sub(first) as usize + 1 == nodes.len() && herd.is_even_to(last);
-        let differ = || nodes.iter().zip(first..).fold(0, |differ, ((_, place), expected)| differ | (place ^ expected));
-        Written { nodes, is_even: may_be && differ() == 0 }
+    pub(super) fn of(herd: &Herd, runs: &'a [Range<u32>], mark: Revision) -> Written<'a> {
+        let even = match runs {
+            [run] if run.len() >= FEW && herd.is_even_to(run.end) => Some(run.start as usize..run.end as usize),
+            _ => None,
+        };
+        Written { mark, runs, places: OnceCell::new(), even }
+    }
+
+    /// The places of all.
+    pub(super) fn places(&self) -> &[u32] {
+        self.places.get_or_init(|| self.runs.iter().cloned().flatten().collect())
+    }
+
+    /// How many of them had a field written, by the revisions of its column; None where to count is no less work than to look at each.
+    pub(super) fn count(&self, strand: &Strand, revisions: &[Revision]) -> Option<usize> {
+        let places = self.even.clone()?;
+        let (at, step) = places_in_steps(&strand.slots[places.clone()]);
+        let revisions = revisions[at..].iter().step_by(step).take(places.len());
+        Some(revisions.fold(0, |count, revision| count + (*revision > self.mark) as usize))
     }
 }
 
-/// Puts those values of a strand into a packet that were written after a revision; None if they are not flat. `written` are
-/// those that may have been.
+/// Puts those values of a strand into a packet that were written; None if they are not flat.
 pub(super) fn gather_flat(
     columns: &Columns,
     herds: &mut Herds,
     herd: usize,
     index: u16,
-    written: Written<'_>,
-    mark: Revision,
+    written: &Written<'_>,
     draft: &mut Draft,
 ) -> Option<()> {
     fn gather<T: Flat<COUNT>, const COUNT: usize>(
         columns: &Columns,
         (numbers, strand): (&[u64], &mut Strand),
         index: u16,
-        nodes: &[(u32, u32)],
-        mark: Revision,
+        written: &Written<'_>,
         draft: &mut Draft,
     ) -> u64 {
-        let (values, revisions, mut added) = (&T::column(columns).values[..], &T::column(columns).revisions[..], 0u64);
-        let (slots, shares) = (&strand.slots[..], &mut strand.shares[..]);
-        draft.group(T::TYPE, FieldOf::Type(index), |bytes, runs| {
-            let is_old = |(_, place): &(u32, u32)| revisions[slots[*place as usize] as usize] <= mark;
-            for nodes in nodes.chunks(BLOCK) {
-                if nodes.iter().all(is_old) {
-                    continue;
-                }
-                // Those that were written: their slots, their places, and where their values are.
-                let (mut written, mut count) = ([[0u32; BLOCK]; 3], 0);
-                for (slot, place) in nodes {
-                    let at = slots[*place as usize];
-                    written.iter_mut().zip([*slot, *place, at]).for_each(|(all, one)| all[count] = one);
-                    count += (revisions[at as usize] > mark) as usize;
-                }
-                let [slots, places, ats] = written.each_ref().map(|all| &all[..count]);
-                runs.extend(slots);
-                let start = bytes.len();
-                bytes.resize(start + 4 * COUNT * count, 0);
-                let into = bytes[start..].as_chunks_mut::<4>().0.as_chunks_mut::<COUNT>().0;
-                for (at, into) in ats.iter().zip(into) {
-                    *into = values[*at as usize].floats().map(f32::to_le_bytes);
-                }
-                for (place, bits) in places.iter().zip(bits_of::<COUNT>(&bytes[start..])) {
-                    let place = *place as usize;
-                    let share = flat_share(numbers[place], index, bits);
-                    added = added.wrapping_add(share).wrapping_sub(std::mem::replace(&mut shares[place], share));
-                }
-            }
-        });
-        added
+        let column = T::column(columns);
+        let count = written.count(strand, &column.revisions);
+        match &written.even {
+            _ if count == Some(0) => 0,
+            Some(even) if count == Some(even.len()) => gather_even(column, (numbers, strand), index, even.clone(), draft),
+            _ => gather_each(column, (numbers, strand), index, written, draft),
+        }
     }
-    let Written { nodes, is_even } = written;
     let strand = herds.herds[herd].strand_mut(index)?;
-    let evenly = match is_even {
-        true => for_flat!(strand.1.field_type, gather_even(columns, (strand.0, &mut *strand.1), index, nodes, mark, draft))?,
-        false => None,
-    };
-    let added = match evenly {
-        Some(added) => added,
-        None => for_flat!(strand.1.field_type, gather(columns, strand, index, nodes, mark, draft))?,
-    };
+    let added = for_flat!(strand.1.field_type, gather(columns, strand, index, written, draft))?;
     herds.add(added);
     Some(())
 }
 
-/// The same where places follow each other and all lies in equal steps. None unless all was written, or nothing.
-fn gather_even<T: Flat<COUNT>, const COUNT: usize>(
-    columns: &Columns,
+/// Gathers those of some values that were written; gives what that adds to the hash.
+fn gather_each<T: Flat<COUNT>, const COUNT: usize>(
+    column: &Column<T>,
     (numbers, strand): (&[u64], &mut Strand),
     index: u16,
-    nodes: &[(u32, u32)],
-    mark: Revision,
+    written: &Written<'_>,
     draft: &mut Draft,
-) -> Option<u64> {
-    let (&[(first, place), (second, _), ..], column) = (nodes, T::column(columns)) else { return None };
-    let places = place as usize..place as usize + nodes.len();
+) -> u64 {
+    let (values, revisions, mark, mut added) = (&column.values[..], &column.revisions[..], written.mark, 0u64);
+    let (slots, shares) = (&strand.slots[..], &mut strand.shares[..]);
+    draft.group(T::TYPE, FieldOf::Type(index), |bytes, runs| {
+        let is_old = |place: &u32| revisions[slots[*place as usize] as usize] <= mark;
+        for places in written.places().chunks(BLOCK) {
+            if places.iter().all(is_old) {
+                continue;
+            }
+            // Those that were written: their slots in the application, their places, and where their values are.
+            let (mut written, mut count) = ([[0u32; BLOCK]; 3], 0);
+            for place in places {
+                let (slot, at) = (numbers[*place as usize] as u32, slots[*place as usize]);
+                written.iter_mut().zip([slot, *place, at]).for_each(|(all, one)| all[count] = one);
+                count += (revisions[at as usize] > mark) as usize;
+            }
+            let [slots, places, ats] = written.each_ref().map(|all| &all[..count]);
+            runs.extend(slots);
+            let start = bytes.len();
+            bytes.resize(start + 4 * COUNT * count, 0);
+            let into = bytes[start..].as_chunks_mut::<4>().0.as_chunks_mut::<COUNT>().0;
+            for (at, into) in ats.iter().zip(into) {
+                *into = values[*at as usize].floats().map(f32::to_le_bytes);
+            }
+            for (place, bits) in places.iter().zip(bits_of::<COUNT>(&bytes[start..])) {
+                let place = *place as usize;
+                let share = flat_share(numbers[place], index, bits);
+                added = added.wrapping_add(share).wrapping_sub(std::mem::replace(&mut shares[place], share));
+            }
+        }
+    });
+    added
+}
+
+/// Gathers values in equal steps, all of which were written.
+fn gather_even<T: Flat<COUNT>, const COUNT: usize>(
+    column: &Column<T>,
+    (numbers, strand): (&[u64], &mut Strand),
+    index: u16,
+    places: Range<usize>,
+    draft: &mut Draft,
+) -> u64 {
     let (at, step) = places_in_steps(&strand.slots[places.clone()]);
-    let revisions = column.revisions[at..].iter().step_by(step).take(nodes.len());
-    match revisions.fold(0, |count, revision| count + (*revision > mark) as usize) {
-        0 => return Some(0),
-        count if count < nodes.len() => return None,
-        _ => {}
-    }
+    let numbers = start_and_step(&numbers[places.clone()]);
     let mut added = 0u64;
     draft.group(T::TYPE, FieldOf::Type(index), |bytes, runs| {
-        runs.push_run(Run { first, step: second - first, count: nodes.len() as u32 });
+        runs.push_run(Run { first: numbers.0 as u32, step: numbers.1 as u32, count: places.len() as u32 });
         let start = bytes.len();
-        bytes.resize(start + 4 * COUNT * nodes.len(), 0);
+        bytes.resize(start + 4 * COUNT * places.len(), 0);
         let into = bytes[start..].as_chunks_mut::<4>().0.as_chunks_mut::<COUNT>().0;
         for (value, into) in column.values[at..].iter().step_by(step).zip(into) {
             *into = value.floats().map(f32::to_le_bytes);
         }
-        added = share_evenly(
-            start_and_step(&numbers[places.clone()]),
-            index,
-            bits_of::<COUNT>(&bytes[start..]),
-            &mut strand.shares[places],
-        );
+        added = share_evenly(numbers, index, bits_of::<COUNT>(&bytes[start..]), &mut strand.shares[places]);
     });
-    Some(added)
+    added
 }
 
 /// Writes a group of a packet to the nodes' fields; None if its values are not flat. The hash follows what stands there then.

@@ -73,9 +73,17 @@ impl Herd {
         Some(Rows { field_type: *field_type, numbers, nodes, slots: &slots[place..], shares: &mut shares[place..], even })
     }
 
-    /// True if all places up to one are in equal steps.
-    pub(super) fn is_even_to(&self, place: u32) -> bool {
-        (place as usize) < self.even
+    /// True if all places before one are in equal steps.
+    pub(super) fn is_even_to(&self, end: u32) -> bool {
+        end as usize <= self.even
+    }
+
+    /// So many nodes from a place on have places in the order of their slots in the application, without gaps.
+    pub(super) fn in_a_row(&self, place: u32) -> u32 {
+        match self.numbers.get(place as usize..) {
+            Some([first, second, ..]) if second.wrapping_sub(*first) == 1 => (self.even as u32).saturating_sub(place).max(1),
+            _ => 1,
+        }
     }
 
     /// A field of all nodes, with the nodes' numbers by their places.

@@ -1,16 +1,18 @@
 //! From a graph to packets.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
+use std::ops::Range;
 use std::sync::Arc;
 
 use slotmap::Key;
 
 use super::bulk::{ImageHashes, LONG, Offered, hash_of_value, message_of_image, message_of_value};
 use super::flat::{Written, gather_flat, put_flat, share_of_flat};
-use super::herd::Herds;
+use super::herd::{Herds, Seat};
 use super::packet::{Draft, FieldOf, Place, TypeRecord, seal};
 use super::routes::KnownRoutes;
 use super::shares::field_share;
+use crate::changes::append_run;
 use crate::codec::{Name, PlainField, Ref, to_bytes};
 use crate::column::FREE;
 use crate::graph::Node;
@@ -65,8 +67,8 @@ pub struct Publisher {
     with_dynamic: BTreeSet<u32>,
     /// Slots of nodes that came with this frame: all of them was told already.
     new: HashSet<u32>,
-    /// Slots and places of nodes of each herd that were written; here so that the memory is used again.
-    written: Vec<Vec<(u32, u32)>>,
+    /// Places of nodes of each herd that were written, those side by side together; here so that the memory is used again.
+    written: Vec<Vec<Range<u32>>>,
     /// Bytes of the last packet.
     usual_length: usize,
     /// Memory of one that is not needed any more.
@@ -178,32 +180,47 @@ impl Publisher {
 
     /// What was written to fields that nodes have by their types.
     fn values(&mut self, graph: &Graph, draft: &mut Draft) {
-        self.written.resize_with(self.types.len(), Vec::new);
-        self.written.iter_mut().for_each(Vec::clear);
-        for slot in graph.changes.slots_since(self.mark) {
-            if let Some(seat) = self.herds.seats.get(slot as usize).filter(|seat| seat.number > 0)
-                && (self.new.is_empty() || !self.new.contains(&slot))
-            {
-                self.written[seat.herd as usize].push((slot, seat.place));
-            }
-        }
-        let written = std::mem::take(&mut self.written);
-        for (herd, nodes) in written.iter().enumerate().filter(|(_, nodes)| !nodes.is_empty()) {
-            let all = Written::of(&self.herds.herds[herd], nodes);
+        self.find_written(graph);
+        let places = std::mem::take(&mut self.written);
+        for (herd, places) in places.iter().enumerate().filter(|(_, places)| !places.is_empty()) {
+            let written = Written::of(&self.herds.herds[herd], places, self.mark);
             for index in 0..self.herds.herds[herd].strands.len() as u16 {
-                if gather_flat(&graph.columns, &mut self.herds, herd, index, all, self.mark, draft).is_none() {
-                    self.others(graph, herd, index, nodes, draft);
+                if gather_flat(&graph.columns, &mut self.herds, herd, index, &written, draft).is_none() {
+                    self.others(graph, herd, index, &written, draft);
                 }
             }
         }
-        self.written = written;
+        self.written = places;
     }
 
-    /// The same for a field that is not a few floats.
-    fn others(&mut self, graph: &Graph, herd: usize, index: u16, nodes: &[(u32, u32)], draft: &mut Draft) {
+    /// Notes which nodes of each herd were written that did not come with this frame.
+    fn find_written(&mut self, graph: &Graph) {
+        self.written.resize_with(self.types.len(), Vec::new);
+        self.written.iter_mut().for_each(Vec::clear);
+        for Range { start: mut slot, end } in graph.changes.slots_since(self.mark) {
+            while slot < end {
+                let mut count = 1;
+                if let Some(Seat { herd, place, .. }) = self.herds.seats.get(slot as usize).filter(|seat| seat.number > 0)
+                    && (self.new.is_empty() || !self.new.contains(&slot))
+                {
+                    if self.new.is_empty() {
+                        count = self.herds.herds[*herd as usize].in_a_row(*place).min(end - slot);
+                    }
+                    append_run(&mut self.written[*herd as usize], *place..place + count);
+                }
+                slot += count;
+            }
+        }
+    }
+
+    /// Tells of a field that is not a few floats.
+    fn others(&mut self, graph: &Graph, herd: usize, index: u16, written: &Written<'_>, draft: &mut Draft) {
         let Some((numbers, strand)) = self.herds.herds[herd].strand_mut(index) else { return };
         let revisions = graph.columns.revisions(strand.field_type);
-        let places = nodes.iter().map(|(_, place)| *place as usize);
+        if written.count(strand, revisions) == Some(0) {
+            return;
+        }
+        let places = written.places().iter().map(|place| *place as usize);
         let written: Vec<(u64, u32)> = places
             .filter(|place| revisions[strand.slots[*place] as usize] > self.mark)
             .map(|place| (numbers[place], strand.slots[place]))
