@@ -199,6 +199,9 @@ impl Stranger {
     }
 }
 
+/// What both ends speak.
+const PROTOCOL: u16 = 7;
+
 /// What is said, and what the application says of it. `HERE` is where the stranger is.
 type Said = (fn(&Stranger), &'static str);
 
@@ -222,12 +225,12 @@ const TO_AN_APPLICATION: &[Said] = &[
         |s| drop(s.joins(4, "old").unwrap_err()),
         "a display at HERE is refused: it speaks version 4 of the protocol, the application speaks 7 (display `old`)",
     ),
-    (|s| drop(s.joins(6, "wall").unwrap_err()), "a display at HERE is refused: there is a display `wall` already"),
+    (|s| drop(s.joins(PROTOCOL, "wall").unwrap_err()), "a display at HERE is refused: there is a display `wall` already"),
     (|s| drop(s.asks("umbriel/guests/snapshot", vec![255; 3]).unwrap_err()), "an application is refused: a message is damaged: "),
     (
         |s| {
             drop(
-                s.asks("umbriel/guests/snapshot", postcard::to_stdvec(&(6u16, s.number, 0u64, "room", false)).unwrap())
+                s.asks("umbriel/guests/snapshot", postcard::to_stdvec(&(PROTOCOL, s.number, 0u64, "room", false)).unwrap())
                     .unwrap_err(),
             )
         },
@@ -251,7 +254,7 @@ fn an_application_and_its_displays_survive_whatever_others_say() {
     let session = session("client", "connect", &address);
     let number = number_of_process(&session.zid().to_string()).unwrap();
     let mut stranger = Stranger { session, number, epoch: 0 };
-    let world = stranger.joins(6, "guest").unwrap();
+    let world = stranger.joins(PROTOCOL, "guest").unwrap();
     stranger.epoch = u64::from_le_bytes(*world.last_chunk().unwrap());
     let token = stranger.session.liveliness().declare_token(format!("umbriel/display/{number}")).wait().unwrap();
     for (does, says) in TO_AN_APPLICATION {
