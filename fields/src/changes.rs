@@ -132,6 +132,19 @@ impl ChangeLog {
         }
     }
 
+    /// Notes a write of so many nodes whose slots lie in equal steps.
+    pub(crate) fn wrote_in_steps(&mut self, first: usize, step: usize, count: usize, revision: Revision) {
+        if step == 1 {
+            return self.wrote_all(first..first + count, revision);
+        }
+        let boundary = *self.boundary.get_mut();
+        for slot in (first..).step_by(step).take(count) {
+            if std::mem::replace(&mut self.nodes[slot], revision) <= boundary {
+                self.append(slot as u32, boundary);
+            }
+        }
+    }
+
     /// The last revision that a reader asked for, and the nodes' revisions; who writes these logs those who were not written since.
     pub(crate) fn parts(&mut self) -> (Revision, &mut [Revision]) {
         (*self.boundary.get_mut(), &mut self.nodes)

@@ -3,11 +3,12 @@
 use std::collections::{HashMap, HashSet};
 
 use super::bulk::{Bulk, ImageHashes};
-use super::flat::{scatter_flat, share_of_flat};
+use super::flat::share_of_flat;
 use super::herd::Herds;
 use super::learn::{Finder, LocalType, NONE, Namer, Nodes, local_type};
 use super::packet::{FieldOf, GroupRead, Head, Packet, Place};
 use super::runs::Run;
+use super::scatter::scatter_flat;
 use super::shares::{field_share, route_share};
 use super::{ReplicaError, damaged};
 use crate::codec::{take_value, to_bytes};

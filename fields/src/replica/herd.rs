@@ -2,6 +2,7 @@
 //! runs along arrays. Here is the hash of all values as well, with what each field adds to it.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use super::packet::Place;
 use super::shares::own_share;
@@ -36,9 +37,13 @@ pub(super) struct Herd {
     own: Vec<u64>,
     /// By the field's index in the application; none where replicas do not learn of it.
     pub(super) strands: Vec<Option<Strand>>,
-    /// So many nodes from the first place on have numbers, slots and values in equal steps, as nodes have that were made one after the other.
-    even: usize,
+    /// Where stretches begin within which numbers, slots and values are in equal steps, as those of nodes are that were made one after the
+    /// other. In order; the first is zero.
+    stretches: Vec<u32>,
 }
+
+/// Shorter stretches are not worth loops of their own.
+pub(super) const FEW: usize = 8;
 
 /// True if the last element of a list is as far from the one before as the second from the first.
 fn goes_on<T: Copy + Into<u64>>(list: &[T]) -> bool {
@@ -65,24 +70,66 @@ pub(super) fn places_in_steps(list: &[u32]) -> (usize, usize) {
 }
 
 impl Herd {
-    /// A field of the nodes from a place on.
-    pub(super) fn rows(&mut self, place: usize, index: u16) -> Option<Rows<'_>> {
-        let Strand { field_type, slots, shares } = self.strands.get_mut(index as usize)?.as_mut()?;
-        let (numbers, nodes) = (&self.numbers[place..], &self.nodes[place..]);
-        let even = self.even.saturating_sub(place);
-        Some(Rows { field_type: *field_type, numbers, nodes, slots: &slots[place..], shares: &mut shares[place..], even })
+    fn new(strands: Vec<Option<Strand>>) -> Herd {
+        Herd { numbers: Vec::new(), nodes: Vec::new(), own: Vec::new(), strands, stretches: Vec::new() }
     }
 
-    /// True if all places before one are in equal steps.
-    pub(super) fn is_even_to(&self, end: u32) -> bool {
-        end as usize <= self.even
+    /// A field of the nodes from a place on, of which so many are of interest.
+    pub(super) fn rows(&mut self, place: usize, count: usize, index: u16) -> Option<Rows<'_>> {
+        let next = self.stretch_after(place);
+        let even = self.stretch_before(next).end - place;
+        let uneven = if even < FEW { self.long_after(next, place.saturating_add(count)) - place } else { even };
+        let Strand { field_type, slots, shares } = self.strands.get_mut(index as usize)?.as_mut()?;
+        let (numbers, nodes) = (&self.numbers[place..], &self.nodes[place..]);
+        Some(Rows { field_type: *field_type, numbers, nodes, slots: &slots[place..], shares: &mut shares[place..], even, uneven })
+    }
+
+    /// The stretch that a place lies in.
+    pub(super) fn stretch(&self, place: usize) -> Range<usize> {
+        self.stretch_before(self.stretch_after(place))
+    }
+
+    /// The number of the stretch after the one that a place lies in.
+    fn stretch_after(&self, place: usize) -> usize {
+        self.stretches.partition_point(|start| *start as usize <= place)
+    }
+
+    fn stretch_before(&self, next: usize) -> Range<usize> {
+        let start = next.checked_sub(1).map_or(0, |at| self.stretches[at] as usize);
+        start..self.stretches.get(next).map_or(self.numbers.len(), |start| *start as usize)
+    }
+
+    /// Where the first stretch after one begins that is worth a loop, or the end of what is of interest.
+    fn long_after(&self, next: usize, end: usize) -> usize {
+        let others = (next + 1..=self.stretches.len()).map(|next| self.stretch_before(next));
+        let long = others.take_while(|stretch| stretch.start < end).find(|stretch| stretch.len() >= FEW);
+        long.map_or(end, |stretch| stretch.start)
     }
 
     /// So many nodes from a place on have places in the order of their slots in the application, without gaps.
     pub(super) fn in_a_row(&self, place: u32) -> u32 {
         match self.numbers.get(place as usize..) {
-            Some([first, second, ..]) if second.wrapping_sub(*first) == 1 => (self.even as u32).saturating_sub(place).max(1),
+            Some([first, second, ..]) if second.wrapping_sub(*first) == 1 => self.stretch(place as usize).end as u32 - place,
             _ => 1,
+        }
+    }
+
+    /// Has a stretch end before a place, or go on over it.
+    fn stretch_on(&mut self, place: usize) {
+        let start = self.stretches.last().map_or(place, |start| *start as usize);
+        let is_even = goes_on(&self.numbers[start..=place])
+            && goes_on(&self.nodes[start..=place])
+            && self.strands.iter().flatten().all(|strand| goes_on(&strand.slots[start..=place]));
+        if start == place || !is_even {
+            self.stretches.push(place as u32);
+        }
+    }
+
+    /// Has a stretch begin at a place.
+    fn cut(&mut self, place: usize) {
+        let at = self.stretches.partition_point(|start| (*start as usize) < place);
+        if place < self.numbers.len() && self.stretches.get(at).is_none_or(|start| *start as usize != place) {
+            self.stretches.insert(at, place as u32);
         }
     }
 
@@ -102,6 +149,8 @@ pub(super) struct Rows<'a> {
     pub(super) shares: &'a mut [u64],
     /// So many of them are in equal steps.
     pub(super) even: usize,
+    /// So many are to be looked at one by one, where those are few.
+    pub(super) uneven: usize,
 }
 
 /// All of them.
@@ -135,7 +184,7 @@ impl Herds {
             strands.resize_with(strands.len().max(index as usize + 1), || None);
             strands[index as usize] = Some(Strand { field_type, slots: Vec::new(), shares: Vec::new() });
         }
-        self.herds.push(Herd { numbers: Vec::new(), nodes: Vec::new(), own: Vec::new(), strands, even: 0 });
+        self.herds.push(Herd::new(strands));
         self.herds.len() as u32 - 1
     }
 
@@ -145,28 +194,34 @@ impl Herds {
         if self.seats.len() <= at {
             self.seats.resize(at + 1, Seat::default());
         }
-        let Herd { numbers, nodes, own, strands, even } = &mut self.herds[herd as usize];
-        self.seats[at] = Seat { number, herd, place: numbers.len() as u32 };
-        numbers.push(number);
-        nodes.push(node);
-        own.push(0);
-        for (index, strand) in strands.iter_mut().enumerate() {
+        let all = &mut self.herds[herd as usize];
+        let place = all.numbers.len();
+        self.seats[at] = Seat { number, herd, place: place as u32 };
+        all.numbers.push(number);
+        all.nodes.push(node);
+        all.own.push(0);
+        for (index, strand) in all.strands.iter_mut().enumerate() {
             let Some(strand) = strand else { continue };
             strand.slots.push(slot(index as u16));
             strand.shares.push(0);
         }
-        let is_even = || goes_on(numbers) && goes_on(nodes) && strands.iter().flatten().all(|strand| goes_on(&strand.slots));
-        *even += (*even + 1 == numbers.len() && is_even()) as usize;
+        all.stretch_on(place);
     }
 
-    /// The fields of a node lie elsewhere now.
+    /// The fields of a node lie elsewhere now; to be followed by [`Herds::moved`].
     pub(super) fn move_slots(&mut self, number: u64, slot: impl Fn(u16) -> u32) {
         let Some(seat) = self.seat(number) else { return };
-        let Herd { strands, even, .. } = &mut self.herds[seat.herd as usize];
-        *even = (*even).min(seat.place as usize);
-        for (index, strand) in strands.iter_mut().enumerate() {
+        for (index, strand) in self.herds[seat.herd as usize].strands.iter_mut().enumerate() {
             let Some(strand) = strand else { continue };
             strand.slots[seat.place as usize] = slot(index as u16);
+        }
+    }
+
+    /// Looks anew for what lies in equal steps.
+    pub(super) fn moved(&mut self) {
+        for herd in &mut self.herds {
+            herd.stretches.clear();
+            (0..herd.numbers.len()).for_each(|place| herd.stretch_on(place));
         }
     }
 
@@ -174,9 +229,14 @@ impl Herds {
     pub(super) fn remove(&mut self, number: u64) {
         let Some(Seat { herd, place, .. }) = self.seat(number) else { return };
         self.seats[number as u32 as usize] = Seat::default();
-        let Herd { numbers, nodes, own, strands, even } = &mut self.herds[herd as usize];
-        let place = place as usize;
-        *even = (*even).min(place);
+        let (place, all) = (place as usize, &mut self.herds[herd as usize]);
+        // The last one comes here, and stands for itself.
+        all.cut(place);
+        all.cut(place + 1);
+        if all.stretches.last().is_some_and(|start| *start as usize + 1 == all.numbers.len()) {
+            all.stretches.pop();
+        }
+        let Herd { numbers, nodes, own, strands, .. } = all;
         numbers.swap_remove(place);
         nodes.swap_remove(place);
         let mut gone = own.swap_remove(place);

@@ -17,6 +17,7 @@ mod bulk;
 mod deeds;
 mod difference;
 mod flat;
+mod gather;
 mod herd;
 mod learn;
 mod local;
@@ -25,6 +26,7 @@ mod packet;
 mod publisher;
 mod routes;
 mod runs;
+mod scatter;
 mod shares;
 
 pub use apply::Replica;

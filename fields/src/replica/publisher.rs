@@ -7,7 +7,8 @@ use std::sync::Arc;
 use slotmap::Key;
 
 use super::bulk::{ImageHashes, LONG, Offered, hash_of_value, message_of_image, message_of_value};
-use super::flat::{Written, gather_flat, put_flat, share_of_flat};
+use super::flat::{put_flat, share_of_flat};
+use super::gather::{Written, gather_flat};
 use super::herd::{Herds, Seat};
 use super::packet::{Draft, FieldOf, Place, TypeRecord, seal};
 use super::routes::KnownRoutes;
@@ -170,6 +171,7 @@ impl Publisher {
             let Some(node) = graph.nodes.get(number_to_id(number)) else { continue };
             self.herds.move_slots(number, |index| node.slots.get(index as usize).copied().unwrap_or(FREE));
         }
+        self.herds.moved();
     }
 
     /// A restored graph may hold another node of that number.
@@ -214,19 +216,13 @@ impl Publisher {
     }
 
     /// Tells of a field that is not a few floats.
-    fn others(&mut self, graph: &Graph, herd: usize, index: u16, written: &Written<'_>, draft: &mut Draft) {
+    fn others(&mut self, graph: &Graph, herd: usize, index: u16, written: &Written, draft: &mut Draft) {
         let Some((numbers, strand)) = self.herds.herds[herd].strand_mut(index) else { return };
         let revisions = graph.columns.revisions(strand.field_type);
-        if written.count(strand, revisions) == Some(0) {
-            return;
-        }
-        let places = written.places().iter().map(|place| *place as usize);
-        let written: Vec<(u64, u32)> = places
-            .filter(|place| revisions[strand.slots[*place] as usize] > self.mark)
-            .map(|place| (numbers[place], strand.slots[place]))
-            .collect();
+        let mut found: Vec<(u64, u32)> = Vec::new();
+        written.each(strand, revisions, |place| found.push((numbers[place], strand.slots[place])));
         let node_type = self.types[herd].clone();
-        for (number, slot) in written {
+        for (number, slot) in found {
             self.value(graph, (number, index), &node_type.fields[index as usize], slot, draft, Purpose::Frame);
         }
     }
