@@ -108,7 +108,7 @@ mod unix {
             Ok(Ear(UnixListener::bind_addr(&name_of(port)?)?))
         }
 
-        /// The next that comes; none for who is of another user and is not let in, and an error once this is closed.
+        /// The next that comes; none for who is of another user and is not let in. `InvalidInput` once this is closed.
         pub(in crate::cluster) fn accept(&self) -> Result<Option<Pipe>> {
             let (stream, _) = self.0.accept()?;
             let let_in = is_ours(&stream).inspect_err(|error| tracing::warn!("on the short line: {error}"));
@@ -310,7 +310,7 @@ mod tests {
         there.shut();
         assert!(!heard.more(&here));
         ear.close();
-        assert!(ear.accept().is_err());
+        assert_eq!(ear.accept().unwrap_err().kind(), std::io::ErrorKind::InvalidInput);
     }
 
     #[test]

@@ -1,11 +1,16 @@
 //! The application's ends of short lines ([`super::near`]): what displays of this machine are told, and what they say.
 
+use std::io::ErrorKind;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use super::gate::{SharedGate, enter};
 use super::message::{Ready, message_of};
 use super::near::{Ear, Heard, Hello, Pipe, Word, append};
+
+/// Before somebody is let in again whom the system had no room for.
+const PAUSE: Duration = Duration::from_millis(10);
 
 /// One line.
 struct Open {
@@ -160,7 +165,13 @@ impl Listener {
                 }));
                 true
             }
-            Err(_) => false,
+            Err(error) if error.kind() == ErrorKind::InvalidInput => false,
+            Err(error) => {
+                // Who comes waits, and those who are there are heard.
+                tracing::debug!("on the short line: {error}");
+                std::thread::sleep(PAUSE);
+                true
+            }
         }
     }
 }
