@@ -5,7 +5,7 @@
 //! it. It takes no part of `/dev/shm`. Who cannot open it (another machine, another user, another system than Linux) gets packets over the network.
 
 use std::fs::File;
-use std::io::{Error, ErrorKind, Result, Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Result, Seek, SeekFrom, Write};
 
 use serde::{Deserialize, Serialize};
 
@@ -145,6 +145,7 @@ fn write_at(mut file: &File, at: u64, bytes: &[u8]) -> Result<()> {
 
 #[cfg(target_os = "linux")]
 mod linux {
+    use std::io::Error;
     use std::os::fd::AsRawFd;
     use std::os::unix::fs::PermissionsExt;
     use std::sync::Arc;
