@@ -239,7 +239,6 @@ macro_rules! columns {
             }
 
             /// Writes a value into a slot of the value's own type. A value has the size of a matrix: it is not moved for that.
-            #[inline(always)]
             pub(crate) fn write(&mut self, slot: u32, value: &Value, compare: bool, revision: Revision) -> bool {
                 match value { $(
                     Value::$one(one) => self.$one_column.write(slot, one.clone(), compare, revision),

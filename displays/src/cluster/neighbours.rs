@@ -104,8 +104,8 @@ pub(super) struct Listening {
 }
 
 impl Listening {
-    /// Lets displays come to the name of a port that know a token; what they say goes to the gate, on one thread for all, so that those who
-    /// are ready at the same time do not wait for each other.
+    /// Lets displays come to the name of a port that know a token; what they say goes to the gate, on one thread for all: with one for
+    /// each, the system would change threads more often.
     ///
     /// # Errors
     /// The name is taken, or the system has no such lines.

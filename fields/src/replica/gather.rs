@@ -6,7 +6,7 @@ use super::flat::{Flat, bits_of, for_flat};
 use super::herd::{FEW, Herd, Herds, Strand, places_in_steps, start_and_step};
 use super::packet::{Draft, FieldOf};
 use super::runs::{Run, RunWriter};
-use super::shares::{flat_share, share_evenly};
+use super::shares::{exchange, flat_share, share_evenly};
 use crate::Revision;
 use crate::column::{Column, Columns};
 
@@ -148,14 +148,22 @@ impl<T> Gathering<'_, T> {
         let (at, step) = places_in_steps(&self.strand.slots[places.clone()]);
         let (first, number_step) = start_and_step(&self.numbers[places.clone()]);
         self.runs.push_run(Run { first: first as u32, step: number_step as u32, count: places.len() as u32 });
-        let start = self.bytes.len();
-        self.bytes.resize(start + 4 * COUNT * places.len(), 0);
-        let into = self.bytes[start..].as_chunks_mut::<4>().0.as_chunks_mut::<COUNT>().0;
-        for (value, into) in self.column.values[at..].iter().step_by(step).zip(into) {
-            *into = value.floats().map(f32::to_le_bytes);
-        }
+        let start = self.put(places.len(), self.column.values[at..].iter().step_by(step));
         let values = bits_of::<COUNT>(&self.bytes[start..]);
         share_evenly((first, number_step), self.index, values, &mut self.strand.shares[places])
+    }
+
+    /// Appends so many values; gives where they begin.
+    #[inline]
+    fn put<'v, const COUNT: usize>(&mut self, count: usize, values: impl Iterator<Item = &'v T>) -> usize
+    where
+        T: Flat<COUNT>,
+    {
+        let start = self.bytes.len();
+        self.bytes.resize(start + 4 * COUNT * count, 0);
+        let into = self.bytes[start..].as_chunks_mut::<4>().0.as_chunks_mut::<COUNT>().0;
+        values.zip(into).for_each(|(value, into)| *into = value.floats().map(f32::to_le_bytes));
+        start
     }
 
     /// Those of a few places that were written.
@@ -163,7 +171,7 @@ impl<T> Gathering<'_, T> {
     where
         T: Flat<COUNT>,
     {
-        let (values, revisions, slots) = (&self.column.values[..], &self.column.revisions[..], &self.strand.slots[..]);
+        let (revisions, slots) = (&self.column.revisions[..], &self.strand.slots[..]);
         if places.iter().all(|place| revisions[slots[*place as usize] as usize] <= self.mark) {
             return 0;
         }
@@ -176,17 +184,13 @@ impl<T> Gathering<'_, T> {
         }
         let [slots, places, ats] = written.each_ref().map(|all| &all[..count]);
         self.runs.extend(slots);
-        let start = self.bytes.len();
-        self.bytes.resize(start + 4 * COUNT * count, 0);
-        let into = self.bytes[start..].as_chunks_mut::<4>().0.as_chunks_mut::<COUNT>().0;
-        for (at, into) in ats.iter().zip(into) {
-            *into = values[*at as usize].floats().map(f32::to_le_bytes);
-        }
+        let column = self.column;
+        let start = self.put(count, ats.iter().map(|at| &column.values[*at as usize]));
         let mut added = 0u64;
         for (place, bits) in places.iter().zip(bits_of::<COUNT>(&self.bytes[start..])) {
             let place = *place as usize;
-            let share = flat_share(self.numbers[place], self.index, bits);
-            added = added.wrapping_add(share).wrapping_sub(std::mem::replace(&mut self.strand.shares[place], share));
+            let stands = flat_share(self.numbers[place], self.index, bits);
+            added = added.wrapping_add(exchange(&mut self.strand.shares[place], stands));
         }
         added
     }

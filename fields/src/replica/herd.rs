@@ -208,18 +208,15 @@ impl Herds {
         all.stretch_on(place);
     }
 
-    /// The fields of a node lie elsewhere now; to be followed by [`Herds::moved`].
-    pub(super) fn move_slots(&mut self, number: u64, slot: impl Fn(u16) -> u32) {
-        let Some(seat) = self.seat(number) else { return };
-        for (index, strand) in self.herds[seat.herd as usize].strands.iter_mut().enumerate() {
-            let Some(strand) = strand else { continue };
-            strand.slots[seat.place as usize] = slot(index as u16);
-        }
-    }
-
-    /// Looks anew for what lies in equal steps.
-    pub(super) fn moved(&mut self) {
+    /// Fields may lie elsewhere now: where, by the node's number and the field's index; none for a node that is gone.
+    pub(super) fn move_slots(&mut self, slot: impl Fn(u64, u16) -> Option<u32>) {
         for herd in &mut self.herds {
+            for (index, strand) in herd.strands.iter_mut().enumerate() {
+                let Some(strand) = strand else { continue };
+                for (at, number) in strand.slots.iter_mut().zip(&herd.numbers) {
+                    *at = slot(*number, index as u16).unwrap_or(*at);
+                }
+            }
             herd.stretches.clear();
             (0..herd.numbers.len()).for_each(|place| herd.stretch_on(place));
         }

@@ -15,8 +15,9 @@ use crate::codec::{PlainField, field_type_named};
 
 const MAGIC: [u8; 4] = *b"UMBf";
 const VERSION: u16 = 3;
-/// What is checked by the checksum begins after magic, version and checksum.
-const CHECKED: usize = 4 + 2 + 8;
+/// The checksum is behind magic and version, and before all that it checks.
+const CHECKSUM: Range<usize> = 6..CHECKED;
+const CHECKED: usize = 6 + 8;
 /// The checksum of a packet that does not leave the machine on which it was made.
 const UNSEALED: u64 = 0;
 /// The length of the head follows, and then the values; the head comes last, since it tells of all of them.
@@ -128,7 +129,7 @@ impl Draft {
         bytes[..4].copy_from_slice(&MAGIC);
         bytes[4..6].copy_from_slice(&VERSION.to_le_bytes());
         bytes[CHECKED..VALUES].copy_from_slice(&(head.len() as u32).to_le_bytes());
-        bytes[6..CHECKED].copy_from_slice(&UNSEALED.to_le_bytes());
+        bytes[CHECKSUM].copy_from_slice(&UNSEALED.to_le_bytes());
         bytes
     }
 }
@@ -141,7 +142,7 @@ fn checksum(bytes: &[u8]) -> u64 {
 pub fn seal(packet: &mut [u8]) {
     if packet.len() >= VALUES {
         let checksum = checksum(packet);
-        packet[6..CHECKED].copy_from_slice(&checksum.to_le_bytes());
+        packet[CHECKSUM].copy_from_slice(&checksum.to_le_bytes());
     }
 }
 
@@ -180,7 +181,7 @@ impl<'a> Packet<'a> {
         if found != VERSION {
             return Err(ReplicaError::WrongVersion { found, ours: VERSION });
         }
-        let sealed = u64::from_le_bytes(std::array::from_fn(|place| bytes[6 + place]));
+        let sealed = u64::from_le_bytes(std::array::from_fn(|place| bytes[CHECKSUM.start + place]));
         if sealed != UNSEALED && sealed != checksum(&bytes) {
             return Err(damaged("its checksum is wrong"));
         }

@@ -167,11 +167,10 @@ impl Publisher {
 
     /// The graph was restored: values of known nodes may lie elsewhere.
     fn find_again(&mut self, graph: &Graph) {
-        for number in self.known.iter().flatten().map(|known| known.number) {
-            let Some(node) = graph.nodes.get(number_to_id(number)) else { continue };
-            self.herds.move_slots(number, |index| node.slots.get(index as usize).copied().unwrap_or(FREE));
-        }
-        self.herds.moved();
+        self.herds.move_slots(|number, index| {
+            let node = graph.nodes.get(number_to_id(number))?;
+            Some(node.slots.get(index as usize).copied().unwrap_or(FREE))
+        });
     }
 
     /// A restored graph may hold another node of that number.
@@ -201,15 +200,14 @@ impl Publisher {
         self.written.iter_mut().for_each(Vec::clear);
         for Range { start: mut slot, end } in graph.changes.slots_since(self.mark) {
             while slot < end {
-                let mut count = 1;
-                if let Some(Seat { herd, place, .. }) = self.herds.seats.get(slot as usize).filter(|seat| seat.number > 0)
-                    && (self.new.is_empty() || !self.new.contains(&slot))
-                {
-                    if self.new.is_empty() {
-                        count = self.herds.herds[*herd as usize].in_a_row(*place).min(end - slot);
-                    }
-                    append_run(&mut self.written[*herd as usize], *place..place + count);
-                }
+                let seat = self.herds.seats.get(slot as usize).filter(|seat| seat.number > 0 && !self.new.contains(&slot));
+                let Some(Seat { herd, place, .. }) = seat else {
+                    slot += 1;
+                    continue;
+                };
+                let in_a_row = if self.new.is_empty() { self.herds.herds[*herd as usize].in_a_row(*place) } else { 1 };
+                let count = in_a_row.min(end - slot);
+                append_run(&mut self.written[*herd as usize], *place..place + count);
                 slot += count;
             }
         }

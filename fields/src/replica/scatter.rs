@@ -3,7 +3,7 @@
 use super::flat::{Flat, bits_of, for_flat, values_of};
 use super::herd::{FEW, Herds, Rows, Seat, places_in_steps, start_and_step};
 use super::packet::GroupRead;
-use super::shares::{flat_share, share_evenly};
+use super::shares::{exchange, flat_share, share_evenly};
 use super::{ReplicaError, damaged};
 use crate::changes::ChangeLog;
 use crate::column::Column;
@@ -90,7 +90,7 @@ impl<T> Target<'_, T> {
             // What stands there counts, which is what was to be written, to the bit.
             values[*at as usize] = T::of_floats(bits.map(f32::from_bits));
             let stands = flat_share(*number, index, bits);
-            added = added.wrapping_add(stands).wrapping_sub(std::mem::replace(share, stands));
+            added = added.wrapping_add(exchange(share, stands));
             revisions[*at as usize] = revision;
             done += 1;
             slot = slot.wrapping_add(step);

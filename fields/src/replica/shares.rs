@@ -41,6 +41,12 @@ fn share<const COUNT: usize>(seed: u64, floats: [u32; COUNT]) -> u64 {
     state + (state == 0) as u64
 }
 
+/// Sets what a field adds to what stands there now; gives the difference.
+#[inline(always)]
+pub(super) fn exchange(share: &mut u64, stands: u64) -> u64 {
+    stands.wrapping_sub(std::mem::replace(share, stands))
+}
+
 /// Sets what values of a field add whose nodes' numbers begin somewhere and go on in equal steps; gives the difference.
 pub(super) fn share_evenly<const COUNT: usize>(
     (first, step): (u64, u64),
@@ -57,7 +63,7 @@ pub(super) fn share_evenly<const COUNT: usize>(
             let mut added = 0u64;
             for (before, floats) in shares.iter_mut().zip(values) {
                 let stands = share(scaled ^ own, floats);
-                added = added.wrapping_add(stands).wrapping_sub(std::mem::replace(before, stands));
+                added = added.wrapping_add(exchange(before, stands));
                 scaled = scaled.wrapping_add(step);
             }
             added
