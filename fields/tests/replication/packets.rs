@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use slotmap::Key;
+use umbriel_fields::record::{Options, Recorder, Replayer};
 use umbriel_fields::replica::{Bulk, Packet, Publisher, Replica, ReplicaError, seal};
-use umbriel_fields::{Changes, Field, Graph, Image, NodeId, NodeType};
+use umbriel_fields::{Changes, Field, Graph, Image, NoHost, NodeId, NodeType, TypeRegistry, Value};
 
 use crate::support::types;
 
@@ -114,6 +115,54 @@ fn values_of_nodes_in_a_row_arrive(others_between: usize) {
 #[test]
 fn values_of_nodes_in_a_row_arrive_however_they_are_written() {
     (0..3).for_each(values_of_nodes_in_a_row_arrive);
+}
+
+/// A recording that is played from a later frame on: values of the nodes lie elsewhere then.
+#[test]
+fn a_graph_that_was_restored_is_followed() {
+    // Of a type that is evaluated here, a restored node is still the same.
+    let of = |name: &str| NodeType::new(name, "").field(Field::new("place", Vec3::ZERO)).evaluate(|_| {});
+    let registry = TypeRegistry::from(vec![of("Thing"), of("Other")]);
+    let mut recorded = Graph::new(registry.clone());
+    let both = (0..40).map(|_| ["Thing", "Other"].map(|name| recorded.create(name).unwrap()));
+    let (nodes, others): (Vec<NodeId>, Vec<NodeId>) = both.map(|[thing, other]| (thing, other)).unzip();
+    let mut recorder = Recorder::new(&mut recorded, Vec::new(), Options { keyframe_every: 1 }).unwrap();
+    for frame in 1..=8 {
+        if frame == 4 {
+            recorded.delete(nodes[3]).unwrap();
+            // Values of things that stand in a row do not lie in a row any more.
+            recorded.delete(others[20]).unwrap();
+        }
+        for (place, node) in nodes.iter().enumerate().filter(|(place, _)| *place != 3 || frame < 4) {
+            recorded.set_named(*node, "place", Vec3::new(frame as f32, place as f32, 1.0)).unwrap();
+        }
+        for other in others.iter().filter(|other| frame < 4 || **other != others[20]) {
+            recorded.set_named(*other, "place", Vec3::splat(-frame as f32)).unwrap();
+        }
+        recorded.evaluate(frame as f64, &mut NoHost);
+        recorder.frame(&mut recorded).unwrap();
+    }
+    let bytes = recorder.finish(&mut recorded).unwrap();
+    let (mut replayer, mut graph) = Replayer::open(&bytes[..], registry.clone()).unwrap();
+    let (mut publisher, bulk) = (Publisher::new(), Bulk::new());
+    publisher.frame(&graph);
+    let copy = |publisher: &mut Publisher, graph: &Graph, bulk: &Bulk| {
+        Replica::new(&Packet::read(publisher.snapshot(graph).unwrap()).unwrap(), registry.clone(), bulk).unwrap()
+    };
+    let mut replica = copy(&mut publisher, &graph, &bulk);
+    for frame in [1, 2, 6, 7, 8] {
+        replayer.seek(&mut graph, frame).unwrap();
+        replica.apply(&Packet::read(publisher.frame(&graph)).unwrap(), &bulk).unwrap();
+        let fresh = copy(&mut publisher, &graph, &bulk);
+        assert!(replica.agrees() && fresh.agrees(), "frame {frame}");
+        assert_eq!(replica.difference(&fresh), None, "frame {frame}");
+        for node in graph.nodes().filter(|node| &*graph.type_of(*node).name == "Thing") {
+            let there = replica.node(node.data().as_ffi()).unwrap();
+            let values = [graph.value_named(node, "place"), replica.graph().value_named(there, "place")];
+            assert_eq!(values[0], values[1], "frame {frame}");
+            assert!(matches!(values[0], Ok(Value::Vec3(found)) if found.x == frame as f32), "frame {frame}: {values:?}");
+        }
+    }
 }
 
 #[test]
